@@ -1,0 +1,49 @@
+use net_geometry::nalgebra::{Matrix6, Vector3};
+use net_geometry::{Junction, Pose};
+
+/// Whether there is a net, and a pose that can be relied on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// A net, and its pose is valid.
+    Ok,
+    /// No net, or none whose pose can be vouched for.
+    NoNet,
+}
+
+impl Status {
+    /// The word used in files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::NoNet => "no_net",
+        }
+    }
+}
+
+/// A net's pose with what follows from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NetPose {
+    /// Net to camera.
+    pub pose: Pose,
+    /// Covariance, rotation (rad) then translation (m), perturbation in the camera frame.
+    pub covariance: Matrix6<f64>,
+    /// From the camera centre to the net along the optical axis, m.
+    pub range_m: f64,
+    /// Perpendicular distance, m.
+    pub distance_m: f64,
+    /// The net's unit normal in the camera frame, positive z.
+    pub normal: Vector3<f64>,
+}
+
+/// What one frame says. Borrows the tracker's buffers: copy what must outlive the next frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Estimate<'a> {
+    /// Whether `net` holds a pose.
+    pub status: Status,
+    /// In [0, 1]: that this frame shows a net and that the pose is right.
+    pub probability: f64,
+    /// The pose, when the status is [`Status::Ok`].
+    pub net: Option<NetPose>,
+    /// Junctions found in this frame.
+    pub junctions: &'a [Junction],
+}
