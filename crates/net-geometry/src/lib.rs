@@ -11,20 +11,24 @@
 //! - **Units**: metres, radians, nanoseconds since the Unix epoch. Degrees only in files and on screen, and then the name says so.
 //! - **Names**: `camera_from_net` maps net coordinates to camera coordinates, so that `a_from_c = a_from_b * b_from_c`.
 
+mod angles;
 mod basis;
 mod camera;
 mod dbscan;
 mod error;
+mod homography;
 mod junction;
 mod mesh;
 mod plane;
 mod pnp;
 mod pose;
 
+pub use angles::ZyxAngles;
 pub use basis::{Basis, WaveVector};
 pub use camera::{Camera, Lens};
 pub use dbscan::Dbscan;
 pub use error::{Error, Result};
+pub use homography::Homography;
 pub use junction::{Junction, JunctionState};
 pub use mesh::Mesh;
 pub use plane::Plane;
