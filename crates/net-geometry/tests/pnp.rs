@@ -1,5 +1,7 @@
 //! Planar PnP and homographies against poses that are known.
 
+#![allow(clippy::unwrap_used)]
+
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use net_geometry::{Camera, Homography, Lens, Pose, ZyxAngles, planar_pnp};
 use proptest::prelude::*;
