@@ -1,0 +1,139 @@
+//! Frames as a log yields them: undecoded, in order, with index, name and time.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use net_image::Image;
+
+use crate::picture;
+
+/// Why one frame can't be used. The log goes on behind it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// The file can't be read.
+    #[error("cannot read it: {why}")]
+    Read {
+        /// What the system said.
+        why: String,
+    },
+    /// The bytes are not a whole picture of a known format.
+    #[error("{format}: {why}")]
+    Decode {
+        /// The format that the first bytes tell, or `unknown format`.
+        format: &'static str,
+        /// What the decoder said.
+        why: String,
+    },
+    /// A picture so large that it is taken for damage.
+    #[error("{width}x{height} px is beyond the limit of {} px a side and {} Mpx", picture::MAX_SIDE, picture::MAX_PIXELS / 1_000_000)]
+    TooLarge {
+        /// Width that the header names, px.
+        width: u64,
+        /// Height that the header names, px.
+        height: u64,
+    },
+    /// A pixel encoding that is not known.
+    #[error("image encoding {encoding:?} is not known; known are {known}")]
+    Encoding {
+        /// What the message says.
+        encoding: String,
+        /// All that would have been accepted.
+        known: &'static str,
+    },
+    /// A raw image whose size, step and data do not fit together.
+    #[error("{why}")]
+    Layout {
+        /// What does not fit, with the numbers.
+        why: String,
+    },
+    /// A message that does not follow its schema.
+    #[error("{schema}: {why}")]
+    Message {
+        /// The message type.
+        schema: String,
+        /// Where and how it ends or goes wrong.
+        why: String,
+    },
+    /// The frame has no time.
+    #[error("{why}")]
+    NoTime {
+        /// Where the time was looked for.
+        why: String,
+    },
+    /// The frame's time does not come after that of the frame before it.
+    #[error("its time, {timestamp_ns} ns, does not come after {previous_ns} ns, the time of frame {previous}")]
+    TimeOrder {
+        /// This frame's time, ns.
+        timestamp_ns: i64,
+        /// The last frame that was in order.
+        previous: u64,
+        /// Its time, ns.
+        previous_ns: i64,
+    },
+    /// The time is ahead of that of all frames around it.
+    #[error("its time, {timestamp_ns} ns, is ahead of the frame after it, {next_ns} ns")]
+    TimeAhead {
+        /// This frame's time, ns.
+        timestamp_ns: i64,
+        /// The time of the frame after it, ns.
+        next_ns: i64,
+    },
+}
+
+/// A frame that has been read or located, but not decoded: cheap to make in order, to be decoded in any thread.
+#[derive(Debug, Clone)]
+pub struct RawFrame {
+    /// Number of the frame in the whole log, from 0; `from`, `to` and `stride` do not change it.
+    pub index: u64,
+    /// File name within an image folder, topic within an MCAP.
+    pub name: Arc<str>,
+    /// Time of exposure, ns since the Unix epoch. `None` only where [`RawFrame::decode`] fails.
+    pub timestamp_ns: Option<i64>,
+    pub(crate) payload: Payload,
+}
+
+/// Where a frame's picture is.
+#[derive(Debug, Clone)]
+pub(crate) enum Payload {
+    /// An image file, not opened yet.
+    File(PathBuf),
+    /// Already known not to be usable.
+    Refused(FrameError),
+}
+
+impl RawFrame {
+    /// Reads and decodes the picture to grey, 0 black to 255 white.
+    ///
+    /// # Errors
+    /// [`FrameError`]: the frame is to be counted as unreadable, the log goes on.
+    pub fn decode(&self) -> Result<Image<u8>, FrameError> {
+        match &self.payload {
+            Payload::File(path) => picture::decode(&read(path)?),
+            Payload::Refused(error) => Err(error.clone()),
+        }
+    }
+
+    /// Makes it unreadable, for a reason that only its neighbours could tell.
+    pub(crate) fn refuse(&mut self, error: FrameError) {
+        if !matches!(self.payload, Payload::Refused(_)) {
+            self.payload = Payload::Refused(error);
+        }
+    }
+
+    /// Whether it is known, without decoding it, that it can't be used.
+    pub(crate) fn is_refused(&self) -> bool {
+        matches!(self.payload, Payload::Refused(_))
+    }
+}
+
+/// A whole file, unless it is too large to be a picture.
+fn read(path: &Path) -> Result<Vec<u8>, FrameError> {
+    let failed = |e: std::io::Error| FrameError::Read { why: e.to_string() };
+    let length = std::fs::metadata(path).map_err(failed)?.len();
+    if length > picture::MAX_BYTES {
+        return Err(FrameError::Read {
+            why: format!("{length} bytes are more than the limit of {}", picture::MAX_BYTES),
+        });
+    }
+    std::fs::read(path).map_err(failed)
+}

@@ -1,0 +1,125 @@
+//! A folder of images.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::frame::{FrameError, Payload, RawFrame};
+use crate::log::{LogInfo, LogKind, OpenOptions, TimeSource};
+use crate::picture;
+use crate::source::timestamps::TIMESTAMPS_CSV;
+use crate::source::{Source, natural, timestamps};
+
+/// Endings that make a file a frame, whatever is in it: if it is no picture, it is an unreadable frame, not a stray file.
+const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "jpe", "tif", "tiff", "bmp", "webp"];
+
+/// The frames of a folder, in natural order of their names.
+pub(crate) struct ImageFolder {
+    path: PathBuf,
+    frames: std::vec::IntoIter<(String, std::result::Result<i64, FrameError>)>,
+    next_index: u64,
+}
+
+impl ImageFolder {
+    /// Lists the folder; opens no image.
+    pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<(LogInfo, Self)> {
+        if !(options.fps.is_finite() && options.fps > 0.0) {
+            let value = options.fps.to_string();
+            return Err(Error::Value { field: "fps", value, expected: "frames per second above zero" });
+        }
+        let mut names = image_names(path)?;
+        let table = path.join(TIMESTAMPS_CSV);
+        let table = if table.is_file() { Some(timestamps::read_csv(&table)?) } else { None };
+        // A file that the table names and that is gone is a frame all the same, an unreadable one.
+        let gone: Vec<String> = table.iter().flat_map(|t| t.keys()).filter(|n| !names.contains(*n)).cloned().collect();
+        names.extend(gone);
+        names.sort_by(|a, b| natural::compare(a, b));
+        if names.is_empty() {
+            let why = "the folder holds no images (PNG, JPEG, TIFF, BMP, WebP)".to_owned();
+            return Err(Error::NotALog { path: path.to_owned(), why });
+        }
+        let (times, source) = match (table, timestamps::from_names(&names)) {
+            (Some(table), _) => {
+                let missing = || FrameError::NoTime { why: format!("{TIMESTAMPS_CSV} does not name it") };
+                let time = |name| match table.get(name) {
+                    Some(Ok(time)) => Ok(*time),
+                    Some(Err(why)) => Err(FrameError::NoTime { why: why.clone() }),
+                    None => Err(missing()),
+                };
+                (names.iter().map(time).collect::<Vec<_>>(), TimeSource::TimestampsCsv)
+            }
+            (None, Some(times)) => {
+                let none = || FrameError::NoTime {
+                    why: "its name is not a time in ns, as those of the others are".to_owned(),
+                };
+                (times.into_iter().map(|t| t.ok_or_else(none)).collect(), TimeSource::FileNames)
+            }
+            (None, None) => {
+                let time = |i: usize| Ok((i as f64 * 1e9 / options.fps).round() as i64);
+                ((0..names.len()).map(time).collect(), TimeSource::MadeUp { fps: options.fps })
+            }
+        };
+        let known = || times.iter().flatten().copied();
+        let camera_file = Some(path.join("camera.yaml")).filter(|p| p.is_file());
+        let info = LogInfo {
+            path: path.to_owned(),
+            kind: LogKind::ImageFolder,
+            topics: Vec::new(),
+            topic: None,
+            frames: Some(names.len() as u64),
+            span_ns: known().min().zip(known().max()),
+            times: source,
+            camera: None,
+            camera_file,
+        };
+        let frames = names.into_iter().zip(times).collect::<Vec<_>>().into_iter();
+        Ok((info, Self { path: path.to_owned(), frames, next_index: 0 }))
+    }
+}
+
+impl Iterator for ImageFolder {
+    type Item = RawFrame;
+
+    fn next(&mut self) -> Option<RawFrame> {
+        let (name, time) = self.frames.next()?;
+        let index = self.next_index;
+        self.next_index += 1;
+        let timestamp_ns = time.as_ref().ok().copied();
+        let payload = match time {
+            Ok(_) => Payload::File(self.path.join(&name)),
+            Err(error) => Payload::Refused(error),
+        };
+        Some(RawFrame { index, name: Arc::from(name), timestamp_ns, payload })
+    }
+}
+
+impl Source for ImageFolder {
+    fn damage(&self) -> &[String] {
+        &[]
+    }
+}
+
+/// Names of the files that are images by their ending or else by their first bytes. Hidden files are not.
+fn image_names(path: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(Error::io("read", path))? {
+        let entry = entry.map_err(Error::io("read", path))?;
+        let Ok(name) = entry.file_name().into_string() else { continue };
+        if name.starts_with('.') || entry.path().is_dir() {
+            continue;
+        }
+        let ending = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_ascii_lowercase());
+        if IMAGE_ENDINGS.contains(&ending.as_str()) || begins_like_an_image(&entry.path()) {
+            names.push(name);
+        }
+    }
+    Ok(names)
+}
+
+/// Looks at the first bytes of a file of unknown ending; one that can't be read is none of ours.
+fn begins_like_an_image(path: &Path) -> bool {
+    use std::io::Read;
+    let mut first = [0; 12];
+    let read = std::fs::File::open(path).and_then(|mut f| f.read(&mut first));
+    read.is_ok_and(|n| picture::sniff(&first[..n]).is_some())
+}
