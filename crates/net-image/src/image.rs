@@ -33,6 +33,14 @@ impl<T: Copy + Default> Image<T> {
         self.height = height;
     }
 
+    /// Takes the size and the values of `view`.
+    pub fn copy_from(&mut self, view: View<'_, T>) {
+        self.resize(view.width(), view.height());
+        for (v, row) in view.rows().enumerate() {
+            self.row_mut(v).copy_from_slice(row);
+        }
+    }
+
     /// Sets every pixel.
     pub fn fill(&mut self, value: T) {
         self.data.fill(value);
