@@ -1,1 +1,20 @@
-//! placeholder
+//! The net's pose from the peaks of its spectrum.
+//!
+//! # Conventions
+//! Frames, pixels and units are those of [`net_geometry`].
+//!
+//! **Normalization.** Transforms are unscaled: the bin of a wave of amplitude `a` holds `a / 2` times the sum of the window's weights.
+//!
+//! **Output order.** A real picture's spectrum is its own mirror image, so [`HalfSpectrum`] keeps the bins of `kx = 0 ..= width / 2` cycles per width, column
+//! by column (what the column transforms leave behind, which saves a transposition): within a column `ky = 0, 1, .., height - 1`, those past `height / 2`
+//! standing for `ky - height`. [`HalfSpectrum::bin`] takes any signed `(kx, ky)`. A [`SpectrumImage`] is shifted: zero in its middle, `kx` to the right, `ky` down.
+
+mod error;
+mod extrema;
+mod fft2;
+mod spectrum;
+
+pub use error::{Error, Result};
+pub use extrema::RunningExtrema;
+pub use fft2::{HalfSpectrum, RealFft2};
+pub use spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};
