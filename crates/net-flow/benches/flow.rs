@@ -1,0 +1,46 @@
+//! Time of the stages for pictures of 848 x 480 px.
+#![allow(missing_docs)] // criterion's macros
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use nalgebra::Vector2;
+use net_flow::{Guess, MatchConfig, Matcher, Pyramid};
+use net_image::GrayView;
+
+const WIDTH: usize = 848;
+const HEIGHT: usize = 480;
+
+/// A net of light twines, 30 px apart, at `shift`, with some grain that is the same in every picture.
+fn draw(shift: Vector2<f64>) -> Vec<u8> {
+    let twine = |x: f64| (-(x - 30.0 * (x / 30.0).round()).powi(2) / 2.5).exp();
+    let pixel = |i: usize| {
+        let (u, v) = ((i % WIDTH) as f64 - shift.x, (i / WIDTH) as f64 - shift.y);
+        let grain = (u * 0.013 * (v * 0.017).sin()).sin() + (u * 0.11 + v * 0.07).cos();
+        (80.0 + 12.0 * grain + 110.0 * twine(u).max(twine(v))) as u8
+    };
+    (0..WIDTH * HEIGHT).map(pixel).collect()
+}
+
+fn stages(c: &mut Criterion) {
+    let (a, b) = (draw(Vector2::zeros()), draw(Vector2::new(2.3, -1.4)));
+    let view = |data| GrayView::packed(data, WIDTH, HEIGHT).expect("a view of its own buffer");
+    let config = MatchConfig::default();
+    let mut prev = Pyramid::new(WIDTH, HEIGHT, config.levels);
+    let mut next = prev.clone();
+    prev.build(view(&a)).expect("its size");
+    c.bench_function("pyramid", |bench| bench.iter(|| next.build(black_box(view(&b))).expect("its size")));
+    let points: Vec<_> =
+        (0..300).map(|i| Vector2::new(35.0 + 40.0 * (i % 20) as f64, 30.0 + 29.0 * (i / 20) as f64)).collect();
+    let mut matcher = Matcher::new(&config).expect("defaults");
+    let mut matches = Vec::new();
+    c.bench_function("match 300 points", |bench| {
+        bench.iter(|| {
+            matcher.match_points(&prev, &next, black_box(&points), Guess::Still, &mut matches).expect("equal sizes");
+            matches.len()
+        })
+    });
+}
+
+criterion_group!(benches, stages);
+criterion_main!(benches);

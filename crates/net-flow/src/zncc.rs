@@ -1,0 +1,408 @@
+//! Zero-mean normalised cross-correlation of one template with all integer shifts of a window.
+//!
+//! `score(d) = sum (T - mean T)(W(d) - mean W(d)) / sqrt(sum (T - mean T)^2 sum (W(d) - mean W(d))^2)`, in [-1, 1]: blind to gain and
+//! offset of the light. The template is kept in sixteenths of a grey level as `i16`, so that products add up in integers (eight in one
+//! instruction, the same on every machine); means and variances of the window come from running sums.
+
+use nalgebra::{Matrix2, Vector2};
+use net_image::Image;
+use wide::{i16x8, i32x4};
+
+/// Largest half width of a template, px.
+pub(crate) const MAX_HALF: usize = 31;
+/// Largest search radius, px.
+pub(crate) const MAX_RADIUS: usize = 24;
+/// Lanes of one product.
+const LANES: usize = 8;
+/// Steps of the template per grey level. 255 * 16 * 255 * 63 * 63 is within `i64`; a row of it within `i32`.
+const STEPS: f32 = 16.0;
+/// A template of less variance, grey levels squared, shows nothing.
+const FLAT_VARIANCE: f64 = 0.5;
+
+/// Template, window and scores; buffers of the largest size.
+#[derive(Debug, Clone)]
+pub(crate) struct Zncc {
+    /// Template rows, each padded with zeros to whole lanes, zero mean up to rounding.
+    template: Vec<i16x8>,
+    /// The same before rounding, packed rows.
+    exact: Vec<f32>,
+    /// Half width of the template, px.
+    half: usize,
+    /// Lanes per template row.
+    row_lanes: usize,
+    /// Sum of the rounded template.
+    sum: i64,
+    /// Sum of squares of the rounded template about its mean.
+    energy: f64,
+    /// Window rows of `stride` values.
+    window: Vec<i16>,
+    /// Column sums of the window, and of its squares.
+    columns: Vec<(i32, i32)>,
+    /// Scores, rows of `2 radius + 1`.
+    scores: Vec<f32>,
+    /// Search radius of `scores`, px.
+    radius: usize,
+}
+
+/// Best shift of a search, relative to its centre.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Peak {
+    /// Shift with sub-pixel part, px.
+    pub shift: Vector2<f64>,
+    /// Score there.
+    pub score: f32,
+    /// Whether it lies on the border of the search, where more may lie beyond.
+    pub on_border: bool,
+}
+
+impl Zncc {
+    pub(crate) fn new() -> Self {
+        let side = 2 * MAX_HALF + 1;
+        let window = side + LANES + 2 * MAX_RADIUS;
+        Self {
+            template: Vec::with_capacity(side * side.div_ceil(LANES)),
+            exact: Vec::with_capacity(side * side),
+            half: 0,
+            row_lanes: 0,
+            sum: 0,
+            energy: 0.0,
+            window: Vec::with_capacity(window * window),
+            columns: Vec::with_capacity(window),
+            scores: Vec::with_capacity((2 * MAX_RADIUS + 1).pow(2)),
+            radius: 0,
+        }
+    }
+
+    /// Cuts the template of half width `half` round `centre` of `image`, bilinear, stretched by `source_from_template` (the
+    /// identity: as it is). False when there is nothing to see in it.
+    pub(crate) fn cut(
+        &mut self,
+        image: &Image<u8>,
+        centre: Vector2<f64>,
+        source_from_template: &Matrix2<f64>,
+        half: usize,
+    ) -> bool {
+        let half = half.clamp(1, MAX_HALF);
+        let side = 2 * half + 1;
+        self.half = half;
+        self.exact.clear();
+        sample_patch(image, centre, source_from_template, half, &mut self.exact);
+        let mean = self.exact.iter().sum::<f32>() / (side * side) as f32;
+        self.exact.iter_mut().for_each(|x| *x -= mean);
+        self.row_lanes = side.div_ceil(LANES);
+        self.template.clear();
+        let (mut sum, mut squares) = (0i64, 0i64);
+        for row in self.exact.chunks_exact(side) {
+            for chunk in row.chunks(LANES) {
+                let mut lanes = [0i16; LANES];
+                for (lane, &x) in lanes.iter_mut().zip(chunk) {
+                    *lane = (x * STEPS).round_ties_even() as i16;
+                    sum += i64::from(*lane);
+                    squares += i64::from(*lane) * i64::from(*lane);
+                }
+                self.template.push(i16x8::from(lanes));
+            }
+        }
+        let n = (side * side) as f64;
+        self.sum = sum;
+        self.energy = squares as f64 - (sum as f64).powi(2) / n;
+        self.energy > FLAT_VARIANCE * n * f64::from(STEPS * STEPS)
+    }
+
+    /// The template before rounding: rows of `2 half + 1`, zero mean.
+    pub(crate) fn exact(&self) -> &[f32] {
+        &self.exact
+    }
+
+    /// Scores all shifts up to `radius` round the whole pixel `centre` of `image`; edges repeated.
+    pub(crate) fn search(&mut self, image: &Image<u8>, centre: (i64, i64), radius: usize) {
+        let radius = radius.min(MAX_RADIUS);
+        let side = 2 * self.half + 1;
+        let reach = (self.half + radius) as i64;
+        let rows = side + 2 * radius;
+        // The last shift still reads whole lanes.
+        let stride = 2 * radius + self.row_lanes * LANES;
+        self.radius = radius;
+        self.load_window(image, (centre.0 - reach, centre.1 - reach), rows, stride);
+        self.columns.clear();
+        self.columns.resize(rows, (0, 0));
+        let n = (side * side) as f64;
+        for v in 0..side {
+            add_row(&mut self.columns, &self.window[v * stride..], 1);
+        }
+        self.scores.clear();
+        for dv in 0..=2 * radius {
+            if dv > 0 {
+                add_row(&mut self.columns, &self.window[(dv - 1) * stride..], -1);
+                add_row(&mut self.columns, &self.window[(dv + side - 1) * stride..], 1);
+            }
+            let (mut sum, mut squares) = (0i64, 0i64);
+            for &(s, q) in &self.columns[..side] {
+                sum += i64::from(s);
+                squares += i64::from(q);
+            }
+            for du in 0..=2 * radius {
+                if du > 0 {
+                    let (out, new) = (self.columns[du - 1], self.columns[du + side - 1]);
+                    sum += i64::from(new.0 - out.0);
+                    squares += i64::from(new.1 - out.1);
+                }
+                let product = match self.row_lanes {
+                    1 => correlate::<1>(&self.template, &self.window[dv * stride + du..], stride),
+                    2 => correlate::<2>(&self.template, &self.window[dv * stride + du..], stride),
+                    3 => correlate::<3>(&self.template, &self.window[dv * stride + du..], stride),
+                    4 => correlate::<4>(&self.template, &self.window[dv * stride + du..], stride),
+                    5 => correlate::<5>(&self.template, &self.window[dv * stride + du..], stride),
+                    6 => correlate::<6>(&self.template, &self.window[dv * stride + du..], stride),
+                    7 => correlate::<7>(&self.template, &self.window[dv * stride + du..], stride),
+                    _ => correlate::<8>(&self.template, &self.window[dv * stride + du..], stride),
+                };
+                let variance = squares as f64 - (sum as f64).powi(2) / n;
+                let covariance = product as f64 - self.sum as f64 * sum as f64 / n;
+                let scale = (self.energy * variance).sqrt();
+                // A flat window resembles nothing.
+                let flat = variance <= FLAT_VARIANCE * n || scale <= 0.0;
+                self.scores.push(if flat { 0.0 } else { (covariance / scale) as f32 });
+            }
+        }
+    }
+
+    /// Scores of the last search, rows of `2 radius + 1`.
+    #[cfg(test)]
+    pub(crate) fn scores(&self) -> &[f32] {
+        &self.scores
+    }
+
+    /// The best shift of the last search with its sub-pixel part.
+    pub(crate) fn peak(&self) -> Peak {
+        let side = 2 * self.radius + 1;
+        let (mut best, mut at) = (f32::NEG_INFINITY, 0);
+        for (i, &s) in self.scores.iter().enumerate() {
+            if s > best {
+                (best, at) = (s, i);
+            }
+        }
+        let (u, v) = (at % side, at / side);
+        let whole = Vector2::new(u as f64 - self.radius as f64, v as f64 - self.radius as f64);
+        if u == 0 || v == 0 || u == side - 1 || v == side - 1 {
+            return Peak { shift: whole, score: best, on_border: true };
+        }
+        let (offset, gain) =
+            quadratic_peak(|du, dv| self.scores[(v as isize + dv) as usize * side + (u as isize + du) as usize]);
+        Peak { shift: whole + offset, score: (best + gain).min(1.0), on_border: false }
+    }
+
+    /// Copies rows of the picture, edges repeated, zeros in the padding.
+    fn load_window(&mut self, image: &Image<u8>, corner: (i64, i64), rows: usize, stride: usize) {
+        let (width, height) = (image.width() as i64, image.height() as i64);
+        self.window.clear();
+        for v in 0..rows as i64 {
+            let source = image.row((corner.1 + v).clamp(0, height - 1) as usize);
+            let inside = corner.0 >= 0 && corner.0 + rows as i64 <= width;
+            if inside {
+                self.window.extend(source[corner.0 as usize..][..rows].iter().map(|&x| i16::from(x)));
+            } else {
+                let at = |u: i64| i16::from(source[(corner.0 + u).clamp(0, width - 1) as usize]);
+                self.window.extend((0..rows as i64).map(at));
+            }
+            self.window.extend(std::iter::repeat_n(0, stride - rows));
+        }
+    }
+}
+
+/// Adds (or takes away) one row to the column sums.
+fn add_row(columns: &mut [(i32, i32)], row: &[i16], sign: i32) {
+    for ((s, q), &x) in columns.iter_mut().zip(row) {
+        let x = i32::from(x);
+        *s += sign * x;
+        *q += sign * x * x;
+    }
+}
+
+/// Sum of products of a template of `N` lanes a row with the window that starts at `window[0]`.
+#[inline]
+fn correlate<const N: usize>(template: &[i16x8], window: &[i16], stride: usize) -> i64 {
+    let mut total = 0i64;
+    let mut sum = i32x4::ZERO;
+    for (v, row) in template.chunks_exact(N).enumerate() {
+        let source = &window[v * stride..][..N * LANES];
+        for (t, w) in row.iter().zip(source.chunks_exact(LANES)) {
+            let mut lanes = [0i16; LANES];
+            lanes.copy_from_slice(w);
+            sum += t.dot(i16x8::from(lanes));
+        }
+        // A lane gains at most 2 * 4080 * 255 = 2.1e6 per product: 16 rows of 8 products stay below 2^31.
+        if v % 16 == 15 {
+            total += i64::from(sum.reduce_add());
+            sum = i32x4::ZERO;
+        }
+    }
+    total + i64::from(sum.reduce_add())
+}
+
+/// Least-squares quadratic through the nine scores `at(-1..=1, -1..=1)`: offset of its maximum, px, at most one half a pixel away
+/// along each axis, and its height above `at(0, 0)`. Falls back to an axis each where the quadratic has no maximum.
+pub(crate) fn quadratic_peak(at: impl Fn(isize, isize) -> f32) -> (Vector2<f64>, f32) {
+    let z = |u, v| f64::from(at(u, v));
+    let column = |u| z(u, -1) + z(u, 0) + z(u, 1);
+    let row = |v| z(-1, v) + z(0, v) + z(1, v);
+    let gradient = Vector2::new(column(1) - column(-1), row(1) - row(-1)) / 6.0;
+    let uu = (column(1) - 2.0 * column(0) + column(-1)) / 3.0;
+    let vv = (row(1) - 2.0 * row(0) + row(-1)) / 3.0;
+    let uv = (z(1, 1) + z(-1, -1) - z(1, -1) - z(-1, 1)) / 4.0;
+    let hessian = Matrix2::new(uu, uv, uv, vv);
+    let fitted = (uu < 0.0 && hessian.determinant() > 0.0).then(|| hessian.try_inverse()).flatten();
+    let axis = |a: f64, b: f64, c: f64| {
+        let bend = a - 2.0 * b + c;
+        if bend < -1e-12 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+    };
+    let offset = match fitted.map(|inverse| -inverse * gradient) {
+        Some(offset) if offset.amax() <= 1.0 => offset.map(|x| x.clamp(-0.5, 0.5)),
+        _ => Vector2::new(axis(z(-1, 0), z(0, 0), z(1, 0)), axis(z(0, -1), z(0, 0), z(0, 1))),
+    };
+    let gain = gradient.dot(&offset) + 0.5 * offset.dot(&(hessian * offset));
+    (offset, gain.clamp(0.0, 0.2) as f32)
+}
+
+/// Samples `(2 half + 1)^2` values round `centre`, bilinear, edges repeated, stretched by `source_from_patch`.
+pub(crate) fn sample_patch(
+    image: &Image<u8>,
+    centre: Vector2<f64>,
+    source_from_patch: &Matrix2<f64>,
+    half: usize,
+    out: &mut Vec<f32>,
+) {
+    let reach = half as i64;
+    let (width, height) = (image.width() as i64, image.height() as i64);
+    let (u0, v0) = (centre.x.floor() as i64, centre.y.floor() as i64);
+    let inside = u0 - reach >= 0 && v0 - reach >= 0 && u0 + reach + 1 < width && v0 + reach + 1 < height;
+    if inside && *source_from_patch == Matrix2::identity() {
+        let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
+        let (a, b, c, d) = ((1.0 - fu) * (1.0 - fv), fu * (1.0 - fv), (1.0 - fu) * fv, fu * fv);
+        let (start, side) = ((u0 - reach) as usize, 2 * half + 1);
+        for v in v0 - reach..=v0 + reach {
+            let top = &image.row(v as usize)[start..][..side + 1];
+            let bottom = &image.row(v as usize + 1)[start..][..side + 1];
+            out.extend((0..side).map(|u| {
+                let x = |r: &[u8], u: usize| f32::from(r[u]);
+                a * x(top, u) + b * x(top, u + 1) + c * x(bottom, u) + d * x(bottom, u + 1)
+            }));
+        }
+        return;
+    }
+    let m = source_from_patch.map(|x| x as f32);
+    let (cu, cv) = (centre.x as f32, centre.y as f32);
+    for v in -reach..=reach {
+        for u in -reach..=reach {
+            let (u, v) = (u as f32, v as f32);
+            out.push(bilinear(image, cu + m.m11 * u + m.m12 * v, cv + m.m21 * u + m.m22 * v));
+        }
+    }
+}
+
+/// One bilinear sample, edges repeated. NaN samples the corner: callers have checked their points.
+#[inline]
+fn bilinear(image: &Image<u8>, u: f32, v: f32) -> f32 {
+    let u = u.clamp(0.0, (image.width() - 1) as f32);
+    let v = v.clamp(0.0, (image.height() - 1) as f32);
+    let (u0, v0) = (u as usize, v as usize);
+    let (u1, v1) = ((u0 + 1).min(image.width() - 1), (v0 + 1).min(image.height() - 1));
+    let (fu, fv) = (u - u0 as f32, v - v0 as f32);
+    let (top, bottom) = (image.row(v0), image.row(v1));
+    let mix = |r: &[u8]| f32::from(r[u0]) * (1.0 - fu) + f32::from(r[u1]) * fu;
+    mix(top) * (1.0 - fv) + mix(bottom) * fv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(width: usize, height: usize) -> Image<u8> {
+        let value = |i: usize| {
+            let (u, v) = ((i % width) as f64, (i / width) as f64);
+            (128.0 + 60.0 * (u * 0.31).sin() + 50.0 * (v * 0.23 + u * 0.11).cos()) as u8
+        };
+        Image::from_vec((0..width * height).map(value).collect(), width, height).expect("right length")
+    }
+
+    /// The definition, in f64.
+    fn naive(template: &[f32], image: &Image<u8>, centre: (i64, i64), half: i64) -> f64 {
+        let at = |u: i64, v: i64| {
+            let u = (centre.0 + u).clamp(0, image.width() as i64 - 1) as usize;
+            f64::from(image.row((centre.1 + v).clamp(0, image.height() as i64 - 1) as usize)[u])
+        };
+        let mut values = Vec::new();
+        for v in -half..=half {
+            values.extend((-half..=half).map(|u| at(u, v)));
+        }
+        let n = values.len() as f64;
+        let mean_w = values.iter().sum::<f64>() / n;
+        let mean_t = template.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
+        let (mut tw, mut tt, mut ww) = (0.0, 0.0, 0.0);
+        for (&t, &w) in template.iter().zip(&values) {
+            let (t, w) = (f64::from(t) - mean_t, w - mean_w);
+            tw += t * w;
+            tt += t * t;
+            ww += w * w;
+        }
+        tw / (tt * ww).sqrt()
+    }
+
+    #[test]
+    fn scores_equal_the_definition() {
+        let image = picture(90, 70);
+        let mut zncc = Zncc::new();
+        // Templates of every number of lanes, in the middle and over the edge of the picture.
+        for (half, centre) in
+            [(1, (40, 30)), (4, (2, 3)), (7, (45, 33)), (10, (80, 60)), (15, (44, 35)), (31, (44, 35))]
+        {
+            assert!(zncc.cut(&image, Vector2::new(41.3, 32.7), &Matrix2::identity(), half));
+            let template = zncc.exact().to_vec();
+            zncc.search(&image, centre, 3);
+            for (i, &score) in zncc.scores().iter().enumerate() {
+                let shifted = (centre.0 + i as i64 % 7 - 3, centre.1 + i as i64 / 7 - 3);
+                let expected = naive(&template, &image, shifted, half as i64);
+                // The template is rounded to a sixteenth of a grey level, the contrast here is some tens of them.
+                assert!((f64::from(score) - expected).abs() < 2e-3, "{half} {i}: {score} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_overflow_at_full_contrast() {
+        let data = (0..128 * 128).map(|i| if (i / 7 + i / (128 * 5)) % 2 == 0 { 255 } else { 0 }).collect();
+        let image = Image::from_vec(data, 128, 128).expect("right length");
+        let mut zncc = Zncc::new();
+        assert!(zncc.cut(&image, Vector2::new(64.0, 64.0), &Matrix2::identity(), MAX_HALF));
+        let template = zncc.exact().to_vec();
+        zncc.search(&image, (64, 64), 1);
+        for (i, &score) in zncc.scores().iter().enumerate() {
+            let expected = naive(&template, &image, (63 + i as i64 % 3, 63 + i as i64 / 3), MAX_HALF as i64);
+            // Rounding as above, on a contrast of 255 levels.
+            assert!((f64::from(score) - expected).abs() < 1e-4, "{i}: {score} {expected}");
+        }
+    }
+
+    #[test]
+    fn flat_templates_and_windows_match_nothing() {
+        let flat = Image::from_vec(vec![77u8; 64 * 64], 64, 64).expect("right length");
+        let mut zncc = Zncc::new();
+        assert!(!zncc.cut(&flat, Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
+        assert!(zncc.cut(&picture(64, 64), Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
+        zncc.search(&flat, (30, 30), 2);
+        assert!(zncc.scores().iter().all(|&s| s == 0.0));
+    }
+
+    #[test]
+    fn quadratic_finds_the_top_of_a_quadratic() {
+        let top = Vector2::new(0.21, -0.37);
+        let height = |u: isize, v: isize| {
+            let d = Vector2::new(u as f64, v as f64) - top;
+            (0.9 - 0.05 * d.x * d.x - 0.04 * d.y * d.y - 0.02 * d.x * d.y) as f32
+        };
+        let (offset, gain) = quadratic_peak(height);
+        // f32 scores.
+        assert!((offset - top).norm() < 1e-5, "{offset}");
+        assert!((height(0, 0) + gain - 0.9).abs() < 1e-6);
+    }
+}
