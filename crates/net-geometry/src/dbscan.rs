@@ -2,16 +2,24 @@
 
 use nalgebra::Vector2;
 
-/// DBSCAN on points of the plane, with its buffers kept between calls.
+use crate::nearest::NearestPoints;
+
+/// DBSCAN on points of the plane, with its buffers kept between calls: it allocates nothing once it has met as many points.
 #[derive(Debug, Clone, Default)]
 pub struct Dbscan {
-    stack: Vec<usize>,
+    neighbours: NearestPoints,
+    /// Points of the cluster at hand whose neighbours are still to be visited.
+    stack: Vec<u32>,
 }
 
 impl Dbscan {
     /// Cluster label of each point into `labels` (cleared first): `None` is noise. Clusters are numbered in the order of their
     /// first core point. Two points are neighbours when at most `radius(index of the first)` apart; a point counts itself.
     /// Returns the number of clusters.
+    ///
+    /// A core point has at least `min_points` neighbours. With a radius of each point's own, its circle decides whom it takes along: a
+    /// point with a large circle may take one with a small circle that would not take it. Points that are not finite, and points whose
+    /// radius is negative or NaN, take nobody along; the former are always noise.
     pub fn cluster(
         &mut self,
         points: &[Vector2<f64>],
@@ -19,21 +27,30 @@ impl Dbscan {
         min_points: usize,
         labels: &mut Vec<Option<u32>>,
     ) -> u32 {
-        let near = |i: usize, j: usize| (points[i] - points[j]).norm() <= radius(i);
+        let Self { neighbours, stack } = self;
+        neighbours.fill(points);
         labels.clear();
         labels.resize(points.len(), None);
         let mut clusters = 0;
         for seed in 0..points.len() {
-            let core = |i: usize| (0..points.len()).filter(|&j| near(i, j)).count() >= min_points;
-            if labels[seed].is_some() || !core(seed) {
+            let near = |i: usize| neighbours.within(points[i], radius(i));
+            let is_core = |i: usize| near(i).take(min_points).count() == min_points;
+            if labels[seed].is_some() || !points[seed].x.is_finite() || !points[seed].y.is_finite() || !is_core(seed) {
                 continue;
             }
-            self.stack.clear();
-            self.stack.push(seed);
-            while let Some(i) = self.stack.pop() {
-                labels[i] = Some(clusters);
-                if core(i) {
-                    self.stack.extend((0..points.len()).filter(|&j| labels[j].is_none() && near(i, j)));
+            labels[seed] = Some(clusters);
+            stack.clear();
+            stack.push(seed as u32);
+            while let Some(i) = stack.pop() {
+                let i = i as usize;
+                if !is_core(i) {
+                    continue;
+                }
+                for j in near(i) {
+                    if labels[j].is_none() {
+                        labels[j] = Some(clusters);
+                        stack.push(j as u32);
+                    }
                 }
             }
             clusters += 1;
