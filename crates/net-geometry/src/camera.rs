@@ -1,22 +1,9 @@
 //! Pinhole camera with a lens.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use crate::error::{Error, Result, finite, positive};
-
-/// How the lens bends the pinhole's rays. Coefficients in OpenCV's order.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Lens {
-    /// Straight pinhole.
-    #[default]
-    None,
-    /// `k1, k2, p1, p2, k3` (ROS `plumb_bob`, Brown 1966).
-    PlumbBob([f64; 5]),
-    /// `k1, k2, p1, p2, k3, k4, k5, k6` (ROS `rational_polynomial`).
-    Rational([f64; 8]),
-    /// `k1, k2, k3, k4` on the angle off the axis (ROS `equidistant`, Kannala and Brandt 2006).
-    KannalaBrandt([f64; 4]),
-}
+use crate::lens::Lens;
 
 /// A calibrated camera: intrinsics in pixels, image size, lens. See the crate's conventions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +15,8 @@ pub struct Camera {
     width: u32,
     height: u32,
     lens: Lens,
+    /// Radius on the plane `z = 1` out to which the lens model is one-to-one.
+    valid_radius: f64,
 }
 
 impl Camera {
@@ -42,16 +31,10 @@ impl Camera {
         finite("cy", cy)?;
         positive("image width", f64::from(width))?;
         positive("image height", f64::from(height))?;
-        let coefficients: &[f64] = match &lens {
-            Lens::None => &[],
-            Lens::PlumbBob(k) => k,
-            Lens::Rational(k) => k,
-            Lens::KannalaBrandt(k) => k,
-        };
-        for &k in coefficients {
+        for &k in lens.coefficients() {
             finite("distortion coefficient", k)?;
         }
-        Ok(Self { fx, fy, cx, cy, width, height, lens })
+        Ok(Self { fx, fy, cx, cy, width, height, lens, valid_radius: lens.valid_radius() })
     }
 
     /// Focal length along u, px.
@@ -99,22 +82,91 @@ impl Camera {
         })
     }
 
-    /// Ray `(x, y, 1)` in the camera frame through pixel `(u, v)`. `None` where the lens model has no inverse.
+    /// The same camera without its lens.
+    pub fn pinhole(&self) -> Self {
+        Self { lens: Lens::None, valid_radius: f64::INFINITY, ..*self }
+    }
+
+    /// The camera of the part of the picture of `width` x `height` px whose top-left pixel is `(u, v)`.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for an empty part.
+    pub fn cropped(&self, u: u32, v: u32, width: u32, height: u32) -> Result<Self> {
+        positive("image width", f64::from(width))?;
+        positive("image height", f64::from(height))?;
+        Ok(Self { cx: self.cx - f64::from(u), cy: self.cy - f64::from(v), width, height, ..*self })
+    }
+
+    /// Ray `(x, y, 1)` in the camera frame through pixel `(u, v)`. `None` where the lens model has no inverse, or more than 89.9 degrees off
+    /// the axis.
     #[inline]
     pub fn ray_from_pixel(&self, pixel: Vector2<f64>) -> Option<Vector3<f64>> {
-        let x = (pixel.x - self.cx) / self.fx;
-        let y = (pixel.y - self.cy) / self.fy;
-        Some(Vector3::new(x, y, 1.0))
+        let distorted = self.plane_from_pixel(pixel);
+        match self.lens {
+            Lens::None => Some(distorted.push(1.0)),
+            lens => lens.undistort(distorted, self.valid_radius).map(|(point, _)| point.push(1.0)),
+        }
+    }
+
+    /// As [`Camera::ray_from_pixel`], with the Jacobian `d(x, y) / d(u, v)`.
+    #[inline]
+    pub fn ray_from_pixel_with_jacobian(&self, pixel: Vector2<f64>) -> Option<(Vector3<f64>, Matrix2<f64>)> {
+        let (point, distortion) = self.lens.undistort(self.plane_from_pixel(pixel), self.valid_radius)?;
+        let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / self.fx, 1.0 / self.fy));
+        Some((point.push(1.0), distortion.try_inverse()? * scale))
     }
 
     /// Pixel of a point in the camera frame, m. `None` behind the camera or beyond the lens model's range.
     #[inline]
     pub fn pixel_from_point(&self, point_in_camera: Vector3<f64>) -> Option<Vector2<f64>> {
-        if point_in_camera.z <= 0.0 {
-            return None;
+        let undistorted = self.plane_from_point(point_in_camera)?;
+        match self.lens {
+            Lens::None => Some(self.pixel_from_plane(undistorted)),
+            lens => Some(self.pixel_from_plane(lens.distort(undistorted).0)),
         }
-        let x = point_in_camera.x / point_in_camera.z;
-        let y = point_in_camera.y / point_in_camera.z;
-        Some(Vector2::new(self.fx * x + self.cx, self.fy * y + self.cy))
+    }
+
+    /// As [`Camera::pixel_from_point`], with the Jacobian `d(u, v) / d(x, y, z)`, px per m.
+    #[inline]
+    pub fn pixel_from_point_with_jacobian(
+        &self,
+        point_in_camera: Vector3<f64>,
+    ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let undistorted = self.plane_from_point(point_in_camera)?;
+        let (distorted, distortion) = self.lens.distort(undistorted);
+        let (x, y, w) = (undistorted.x, undistorted.y, 1.0 / point_in_camera.z);
+        let projection = Matrix2x3::new(w, 0.0, -x * w, 0.0, w, -y * w);
+        let scale = Matrix2::from_diagonal(&Vector2::new(self.fx, self.fy));
+        Some((self.pixel_from_plane(distorted), scale * distortion * projection))
+    }
+
+    /// Where the lens puts what the pinhole of the same intrinsics would see at `pixel`: what an undistorted picture is read from.
+    pub fn pixel_from_pinhole(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
+        self.pixel_from_point(self.plane_from_pixel(pixel).push(1.0))
+    }
+
+    /// Where the pinhole of the same intrinsics would see what the lens puts at `pixel`.
+    pub fn pinhole_from_pixel(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
+        self.ray_from_pixel(pixel).map(|ray| self.pixel_from_plane(ray.xy()))
+    }
+
+    /// Pixel to the plane `z = 1`, lens and all.
+    #[inline]
+    fn plane_from_pixel(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy)
+    }
+
+    #[inline]
+    fn pixel_from_plane(&self, point: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(self.fx * point.x + self.cx, self.fy * point.y + self.cy)
+    }
+
+    /// A point in front of the camera, and within the lens model's range, to the plane `z = 1`.
+    #[inline]
+    fn plane_from_point(&self, point: Vector3<f64>) -> Option<Vector2<f64>> {
+        let on_plane = point.xy() / point.z;
+        // NaN is neither in front nor within.
+        let seen = point.z > 0.0 && (matches!(self.lens, Lens::None) || on_plane.norm() <= self.valid_radius);
+        seen.then_some(on_plane)
     }
 }

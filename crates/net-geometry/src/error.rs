@@ -19,6 +19,16 @@ pub enum Error {
         /// What would have been accepted.
         expected: &'static str,
     },
+    /// A lens model that is not known, or not with as many coefficients.
+    #[error("distortion model {model:?} with {count} coefficients: {expected}")]
+    LensModel {
+        /// The model that was given.
+        model: String,
+        /// How many coefficients were given.
+        count: usize,
+        /// What is wrong, or what would have been accepted.
+        expected: &'static str,
+    },
     /// The camera was calibrated for another image size than the one at hand.
     #[error(
         "the camera is calibrated for {camera_width}x{camera_height} px, the image is {image_width}x{image_height} px"

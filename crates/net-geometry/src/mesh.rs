@@ -83,29 +83,51 @@ impl Mesh {
     }
 }
 
+/// What a mesh may be written as.
+const MESH_TEXT: &str = "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, 50x50mm@60deg for an oblique mesh (sides up to 2 m, angle between 0 and 180 degrees)";
+
+/// Longest side taken from text, m: `50` is meant as millimetres, not as a net of 50 m meshes.
+const MAX_SIDE_IN_TEXT: f64 = 2.0;
+
 /// `50mm`, `5cm`, `0.05m`, `0.05` (metres), `50x40mm`, `50x50mm@60deg`.
 impl std::str::FromStr for Mesh {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let expected =
-            "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, 50x50mm@60deg for an oblique mesh";
-        let wrong = || Error::MeshText { text: text.to_owned(), expected };
-        let number = |s: &str| s.trim().parse::<f64>().map_err(|_| wrong());
-        let (sizes, angle) = match text.trim().split_once('@') {
-            Some((sizes, angle)) => (sizes, number(angle.trim().strip_suffix("deg").ok_or_else(wrong)?)?.to_radians()),
-            None => (text.trim(), std::f64::consts::FRAC_PI_2),
-        };
-        let (digits, unit) = match sizes {
-            s if s.ends_with("mm") => (&s[..s.len() - 2], 1e-3),
-            s if s.ends_with("cm") => (&s[..s.len() - 2], 1e-2),
-            s if s.ends_with('m') => (&s[..s.len() - 1], 1.0),
-            s => (s, 1.0),
-        };
-        let (a, b) = match digits.split_once('x') {
-            Some((a, b)) => (number(a)? * unit, number(b)? * unit),
-            None => (number(digits)? * unit, number(digits)? * unit),
-        };
-        Self::oblique(a, b, angle)
+        parse(text.trim()).ok_or_else(|| Error::MeshText { text: text.to_owned(), expected: MESH_TEXT })
+    }
+}
+
+fn parse(text: &str) -> Option<Mesh> {
+    let (sizes, angle) = match text.split_once('@') {
+        Some((sizes, angle)) => (sizes, number(angle.strip_suffix("deg")?)?.to_radians()),
+        None => (text, std::f64::consts::FRAC_PI_2),
+    };
+    // "mm" before "m". Divided, not multiplied: 50 / 1000 is the number nearest to 0.05, 50 * 0.001 is not.
+    let units = [("mm", 1000.0), ("cm", 100.0), ("m", 1.0), ("", 1.0)];
+    let (digits, per_metre) =
+        units.into_iter().find_map(|(unit, n)| Some((sizes.trim_end().strip_suffix(unit)?, n)))?;
+    let (a, b) = digits.split_once('x').unwrap_or((digits, digits));
+    let side = |digits| number(digits).map(|x| x / per_metre).filter(|&x| x <= MAX_SIDE_IN_TEXT);
+    Mesh::oblique(side(a)?, side(b)?, angle).ok()
+}
+
+/// A plain decimal number: Rust's parser would take `inf` and `nan` too.
+fn number(text: &str) -> Option<f64> {
+    let text = text.trim();
+    text.bytes().all(|c| c.is_ascii_digit() || matches!(c, b'.' | b'e' | b'-')).then(|| text.parse().ok())?
+}
+
+/// The form that [`Mesh::from_str`](std::str::FromStr) reads, in millimetres.
+impl std::fmt::Display for Mesh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // To a nanometre and a millionth of a degree: 0.0275 m is 27.5mm, not 27.500000000000004mm.
+        let rounded = |x: f64, unit: f64| (x * unit * 1e6).round() / 1e6;
+        let (a, b) = (rounded(self.side1, 1e3), rounded(self.side2, 1e3));
+        if a == b && self.is_right_angled() {
+            return write!(f, "{a}mm");
+        }
+        write!(f, "{a}x{b}mm")?;
+        if self.is_right_angled() { Ok(()) } else { write!(f, "@{}deg", rounded(self.angle.to_degrees(), 1.0)) }
     }
 }
