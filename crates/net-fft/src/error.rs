@@ -33,6 +33,9 @@ pub enum Error {
         /// What would have been accepted.
         expected: &'static str,
     },
+    /// An image that makes no sense.
+    #[error(transparent)]
+    Image(#[from] net_image::Error),
     /// Geometry that does not work out: parallel wave vectors, a camera of another image size.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),

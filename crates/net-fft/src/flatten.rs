@@ -102,8 +102,16 @@ impl Flattener {
             for (u, ring) in self.rings.row_mut(v).iter_mut().enumerate() {
                 let bin = Vector2::new(u as f64 - constant_bin.0 as f64, v as f64 - constant_bin.1 as f64);
                 // Bins are 1 / width and 1 / height of a cycle per pixel: measure in the finer of the two.
-                let radius = if self.aspect > 1.0 { bin.x.hypot(bin.y * self.aspect) } else { (bin.x / self.aspect).hypot(bin.y) };
-                *ring = if bin.norm() < CORE_BINS { CORE_RING } else { (radius as usize).min(usize::from(CORE_RING) - 1) as u16 };
+                let radius = if self.aspect > 1.0 {
+                    bin.x.hypot(bin.y * self.aspect)
+                } else {
+                    (bin.x / self.aspect).hypot(bin.y)
+                };
+                *ring = if bin.norm() < CORE_BINS {
+                    CORE_RING
+                } else {
+                    (radius as usize).min(usize::from(CORE_RING) - 1) as u16
+                };
                 if *ring != CORE_RING {
                     last = last.max(usize::from(*ring));
                 }
@@ -142,7 +150,7 @@ mod tests {
 
     /// Noise whose spectrum falls like a shaded picture's, with or without a wave on it.
     fn picture(width: usize, height: usize, wave: f32) -> Vec<f32> {
-        let mut state = 0x1234_5678_9ABC_DEFu64;
+        let mut state = 0x0123_4567_89AB_CDEF_u64;
         let mut walk = vec![0.0f32; width * height];
         for v in 0..height {
             for u in 0..width {

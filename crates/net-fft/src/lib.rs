@@ -9,12 +9,26 @@
 //! by column (what the column transforms leave behind, which saves a transposition): within a column `ky = 0, 1, .., height - 1`, those past `height / 2`
 //! standing for `ky - height`. [`HalfSpectrum::bin`] takes any signed `(kx, ky)`. A [`SpectrumImage`] is shifted: zero in its middle, `kx` to the right, `ky` down.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 mod error;
 mod extrema;
 mod fft2;
+mod field;
+mod filter;
+mod flatten;
+mod peaks;
+mod score;
+mod sections;
 mod spectrum;
 
 pub use error::{Error, Result};
 pub use extrema::RunningExtrema;
 pub use fft2::{HalfSpectrum, RealFft2};
+pub use field::LatticeField;
+pub use filter::{Ellipse, FallingThreshold, FilterConfig, filter_peaks};
+pub use flatten::Flattener;
+pub use peaks::{Peak, PeakConfig, PeakFinder};
+pub use score::{Candidate, ScoreConfig, score_peaks};
+pub use sections::{GridConfig, SectionView};
 pub use spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};

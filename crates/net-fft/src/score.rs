@@ -202,15 +202,12 @@ impl Levels<'_> {
         }
         let mut worst = 0.0f64;
         for period in [2, 3] {
-            let (mut on, mut off) = ((0.0, 0.0), (0.0, 0.0));
-            for (index, &level) in levels[..count].iter().enumerate() {
-                let group = if (index + 1) % period == 0 { &mut on } else { &mut off };
-                group.0 += level;
-                group.1 += 1.0;
-            }
-            if on.1 > 0.0 && off.1 > 0.0 {
-                worst = worst.max(on.0 / on.1 - off.0 / off.1);
-            }
+            // Each of those multiples against the ones since the last: levels fall from multiple to multiple, so the later ones prove nothing.
+            let groups = levels[..count].chunks_exact(period);
+            let rise =
+                |group: &[f64]| group[period - 1] - group[..period - 1].iter().sum::<f64>() / (period - 1) as f64;
+            let found = groups.len() as f64;
+            worst = worst.max(groups.map(rise).sum::<f64>() / found.max(1.0));
         }
         worst
     }
@@ -258,7 +255,8 @@ mod tests {
     #[test]
     fn multiples_refine_the_vector_with_the_square_of_their_number() {
         let found = score(&[(10, 0, 164), (21, 0, 144), (32, 1, 124)], ScoreConfig::default());
-        let expected = (Vector2::new(10.0, 0.0) + 2.0 * Vector2::new(21.0, 0.0) + 3.0 * Vector2::new(32.0, 1.0)) / 14.0;
+        let expected: Vector2<f64> =
+            (Vector2::new(10.0, 0.0) + 2.0 * Vector2::new(21.0, 0.0) + 3.0 * Vector2::new(32.0, 1.0)) / 14.0;
         assert!((found[0].bin - expected).norm() < 1e-12, "{:?}", found[0].bin);
     }
 

@@ -1,0 +1,197 @@
+//! The picture in sections (thesis 4.3.6): a grid of any rows and columns, with overlap.
+
+use net_geometry::nalgebra::{Matrix2, Vector2, Vector3};
+use net_geometry::{Camera, WaveVector};
+
+use crate::error::{Error, Result};
+
+/// How a picture is divided.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GridConfig {
+    /// Rows of sections.
+    pub rows: usize,
+    /// Columns of sections.
+    pub columns: usize,
+    /// How much of its length a section shares with the next one: 0 side by side (thesis), below 1. With overlap the sections' sides are rounded down to
+    /// products of 2, 3 and 5, which transform fastest.
+    pub overlap: f64,
+}
+
+impl Default for GridConfig {
+    /// The thesis's four sections.
+    fn default() -> Self {
+        Self { rows: 2, columns: 2, overlap: 0.0 }
+    }
+}
+
+impl GridConfig {
+    /// Refuses values out of range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] names the field.
+    pub fn validate(&self) -> Result<()> {
+        for (field, value) in [("rows", self.rows), ("columns", self.columns)] {
+            if !(1..=64).contains(&value) {
+                return Err(Error::Parameter { field, value: value as f64, expected: "1 to 64 sections" });
+            }
+        }
+        if !(0.0..1.0).contains(&self.overlap) {
+            return Err(Error::Parameter { field: "overlap", value: self.overlap, expected: "0 or more, below 1" });
+        }
+        Ok(())
+    }
+
+    /// Width and height of a section of a picture of `width` x `height` px; at least 1.
+    pub fn section_size(&self, width: usize, height: usize) -> (usize, usize) {
+        let side = |length: usize, count: usize| {
+            let shared = count as f64 - (count as f64 - 1.0) * self.overlap;
+            let longest = ((length as f64 / shared).floor() as usize).max(1);
+            if self.overlap == 0.0 { longest } else { fast_size_up_to(longest) }
+        };
+        (side(width, self.columns), side(height, self.rows))
+    }
+
+    /// Top-left pixels of the sections, row by row, spread evenly from border to border.
+    pub fn corners(&self, width: usize, height: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (section_width, section_height) = self.section_size(width, height);
+        let (rows, columns) = (self.rows, self.columns);
+        let start = |index: usize, count: usize, length: usize, side: usize| {
+            let room = length.saturating_sub(side);
+            if count > 1 { (room * index + (count - 1) / 2) / (count - 1) } else { room / 2 }
+        };
+        (0..rows).flat_map(move |row| {
+            (0..columns).map(move |column| {
+                (start(column, columns, width, section_width), start(row, rows, height, section_height))
+            })
+        })
+    }
+}
+
+/// The largest product of 2, 3 and 5 that does not exceed `length`, and is even where it can be.
+fn fast_size_up_to(length: usize) -> usize {
+    let is_fast = |mut n: usize| {
+        for factor in [2, 3, 5] {
+            while n.is_multiple_of(factor) {
+                n /= factor;
+            }
+        }
+        n == 1
+    };
+    (1..=length).rev().find(|&n| is_fast(n) && (n.is_multiple_of(2) || n == 1)).unwrap_or(1)
+}
+
+/// Where a section looks: what turns its bins into directions in the camera frame.
+///
+/// A wave vector belongs to the section's centre. Of the lens only the Jacobian there matters: it maps wave vectors of the picture to those an ideal pinhole of
+/// focal length 1 would see (`k = Jᵀ q`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SectionView {
+    /// Centre, px of the whole picture.
+    pub centre: Vector2<f64>,
+    /// Ray `(x, y, 1)` through the centre.
+    pub ray: Vector3<f64>,
+    /// Cycles per pixel of the whole picture for one bin, along u and v.
+    pub wave_per_bin: Vector2<f64>,
+    /// `d(x, y) / d(u, v)` at the centre, 1 / px.
+    jacobian: Matrix2<f64>,
+    inverse: Matrix2<f64>,
+}
+
+impl SectionView {
+    /// The section of `width` x `height` px with its top-left pixel at `corner`, of a picture reduced `reduction` times.
+    /// `None` where the lens model has no inverse.
+    pub fn new(camera: &Camera, corner: (usize, usize), width: usize, height: usize, reduction: usize) -> Option<Self> {
+        let factor = reduction as f64;
+        // A reduced pixel's centre is that of the square it averages.
+        let centre_of =
+            |start: usize, side: usize| factor * (start as f64 + (side as f64 - 1.0) / 2.0) + (factor - 1.0) / 2.0;
+        let centre = Vector2::new(centre_of(corner.0, width), centre_of(corner.1, height));
+        let ray = camera.ray_from_pixel(centre)?;
+        // Central differences over a pixel: lenses bend over hundreds.
+        let step = |du: f64, dv: f64| {
+            let shift = Vector2::new(du, dv);
+            let (ahead, back) = (camera.ray_from_pixel(centre + shift)?, camera.ray_from_pixel(centre - shift)?);
+            Some((ahead / ahead.z - back / back.z).xy())
+        };
+        let jacobian = Matrix2::from_columns(&[step(0.5, 0.0)?, step(0.0, 0.5)?]);
+        let inverse = jacobian.try_inverse()?;
+        let wave_per_bin = Vector2::new(1.0 / (width as f64 * factor), 1.0 / (height as f64 * factor));
+        Some(Self { centre, ray: ray / ray.z, wave_per_bin, jacobian, inverse })
+    }
+
+    /// Cycles per pixel of the whole picture.
+    #[inline]
+    pub fn wave_from_bin(&self, bin: Vector2<f64>) -> WaveVector {
+        bin.component_mul(&self.wave_per_bin)
+    }
+
+    /// Cycles per unit of `x` and `y` of the ray: what a pinhole of focal length 1 sees.
+    #[inline]
+    pub fn ideal_from_bin(&self, bin: Vector2<f64>) -> Vector2<f64> {
+        self.inverse.tr_mul(&self.wave_from_bin(bin))
+    }
+
+    /// The way back.
+    #[inline]
+    pub fn bin_from_ideal(&self, ideal: Vector2<f64>) -> Vector2<f64> {
+        self.jacobian.tr_mul(&ideal).component_div(&self.wave_per_bin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use net_geometry::Lens;
+
+    #[test]
+    fn four_sections_are_the_thesiss() {
+        let grid = GridConfig::default();
+        assert_eq!(grid.section_size(848, 480), (424, 240));
+        assert_eq!(grid.corners(848, 480).collect::<Vec<_>>(), [(0, 0), (424, 0), (0, 240), (424, 240)]);
+        assert_eq!(grid.section_size(849, 481), (424, 240));
+    }
+
+    #[test]
+    fn overlapping_sections_reach_from_border_to_border() {
+        for (rows, columns, overlap) in [(3, 5, 0.3), (1, 3, 0.5), (1, 1, 0.2), (2, 2, 0.25)] {
+            let grid = GridConfig { rows, columns, overlap };
+            let (width, height) = grid.section_size(848, 480);
+            let corners: Vec<_> = grid.corners(848, 480).collect();
+            assert_eq!(corners.len(), rows * columns);
+            assert!(corners.iter().all(|&(u, v)| u + width <= 848 && v + height <= 480));
+            if columns > 1 && rows > 1 {
+                assert_eq!((corners[0], corners[rows * columns - 1]), ((0, 0), (848 - width, 480 - height)));
+            }
+        }
+        assert_eq!(fast_size_up_to(231), 216);
+        assert_eq!(fast_size_up_to(1), 1);
+    }
+
+    #[test]
+    fn a_wave_through_a_lens_is_a_wave_of_the_pinhole() {
+        let lens = Lens::PlumbBob([-0.3, 0.1, 0.001, -0.002, 0.0]);
+        let camera = Camera::new(600.0, 590.0, 424.0, 240.0, 848, 480, lens).unwrap();
+        let view = SectionView::new(&camera, (10, 20), 216, 200, 1).unwrap();
+        // A plane wave of the ideal picture, and its phase one pixel to the right and one below.
+        let ideal = Vector2::new(17.0, -9.0);
+        let wave = view.wave_from_bin(view.bin_from_ideal(ideal));
+        let phase = |du: f64, dv: f64| {
+            let ray = camera.ray_from_pixel(view.centre + Vector2::new(du, dv)).unwrap();
+            ideal.dot(&ray.xy())
+        };
+        // Curvature over one pixel: 1e-6 of a cycle.
+        assert!((phase(0.5, 0.0) - phase(-0.5, 0.0) - wave.x).abs() < 1e-6);
+        assert!((phase(0.0, 0.5) - phase(0.0, -0.5) - wave.y).abs() < 1e-6);
+        let back = view.ideal_from_bin(view.bin_from_ideal(ideal));
+        assert!((back - ideal).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_reduced_picture_has_the_same_centre() {
+        let camera = Camera::new(600.0, 600.0, 424.0, 240.0, 848, 480, Lens::None).unwrap();
+        let whole = SectionView::new(&camera, (0, 0), 848, 480, 1).unwrap();
+        let half = SectionView::new(&camera, (0, 0), 424, 240, 2).unwrap();
+        assert_eq!((whole.centre, whole.wave_per_bin), (half.centre, half.wave_per_bin));
+    }
+}
