@@ -1,1 +1,17 @@
-//! Bindings.
+//! `netpose_rs._core`: the compiled half of the Python package `netpose_rs`. Documentation for users is in the Python stubs.
+
+mod arrays;
+mod camera;
+mod estimate;
+mod tracker;
+
+/// The private extension module.
+#[pyo3::pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::camera::{Camera, Mesh};
+    #[pymodule_export]
+    use crate::estimate::Estimate;
+    #[pymodule_export]
+    use crate::tracker::{Tracker, estimate};
+}

@@ -1,0 +1,96 @@
+//! What one frame says, owned by Python.
+
+use numpy::{PyArray1, PyArray2, ToPyArray};
+use pyo3::prelude::*;
+
+/// What one frame says.
+#[pyclass(frozen, module = "netpose_rs")]
+pub struct Estimate {
+    #[pyo3(get)]
+    status: &'static str,
+    #[pyo3(get)]
+    probability: f64,
+    net: Option<netpose::NetPose>,
+    junctions: Vec<netpose::Junction>,
+}
+
+impl Estimate {
+    /// Copies what must outlive the frame.
+    pub fn from_frame(estimate: &netpose::Estimate<'_>) -> Self {
+        Self {
+            status: estimate.status.as_str(),
+            probability: estimate.probability,
+            net: estimate.net,
+            junctions: estimate.junctions.to_vec(),
+        }
+    }
+}
+
+#[pymethods]
+impl Estimate {
+    #[getter]
+    fn range_m(&self) -> Option<f64> {
+        self.net.map(|n| n.range_m)
+    }
+    #[getter]
+    fn distance_m(&self) -> Option<f64> {
+        self.net.map(|n| n.distance_m)
+    }
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.net.map(|n| n.normal.as_slice().to_pyarray(py))
+    }
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.net.map(|n| matrix(py, 4, |r, c| n.pose.matrix()[(r, c)])).transpose()
+    }
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.net.map(|n| matrix(py, 6, |r, c| n.covariance[(r, c)])).transpose()
+    }
+    #[getter]
+    fn junctions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<f64> = self.junctions.iter().flat_map(|j| [j.pixel.x, j.pixel.y]).collect();
+        array2(py, rows, self.junctions.len(), 2)
+    }
+    #[getter]
+    fn lattice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let unnamed = (i32::MIN, i32::MIN);
+        let rows: Vec<i64> = self
+            .junctions
+            .iter()
+            .flat_map(|j| {
+                let (i, j) = j.index.unwrap_or(unnamed);
+                [i64::from(i), i64::from(j)]
+            })
+            .collect();
+        array2(py, rows, self.junctions.len(), 2)
+    }
+    fn __repr__(&self) -> String {
+        match self.net {
+            Some(n) => format!(
+                "Estimate(status='ok', probability={:.3}, range_m={:.4}, junctions={})",
+                self.probability,
+                n.range_m,
+                self.junctions.len()
+            ),
+            None => format!("Estimate(status='{}', probability={:.3})", self.status, self.probability),
+        }
+    }
+}
+
+/// `rows * columns` values as an array of that shape.
+pub fn array2<'py, T: numpy::Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    rows: usize,
+    columns: usize,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    use numpy::{IntoPyArray, PyArrayMethods};
+    values.into_pyarray(py).reshape([rows, columns])
+}
+
+fn matrix<'py>(py: Python<'py>, n: usize, at: impl Fn(usize, usize) -> f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let values = (0..n * n).map(|k| at(k / n, k % n)).collect();
+    array2(py, values, n, n)
+}

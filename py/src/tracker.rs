@@ -1,0 +1,49 @@
+//! `Tracker` and `estimate`.
+
+use pyo3::prelude::*;
+
+use crate::arrays::GrayArgument;
+use crate::camera::{Camera, Mesh, value_error};
+use crate::estimate::Estimate;
+
+/// Follows one net through the frames of one camera.
+#[pyclass(module = "netpose_rs")]
+pub struct Tracker {
+    inner: netpose::Tracker,
+}
+
+#[pymethods]
+impl Tracker {
+    #[new]
+    #[pyo3(signature = (camera, mesh, *, method=None))]
+    fn new(camera: &Camera, mesh: &Mesh, method: Option<&str>) -> PyResult<Self> {
+        Ok(Self { inner: netpose::Tracker::new(camera.inner, mesh.inner, &config(method)?).map_err(value_error)? })
+    }
+
+    fn update(&mut self, py: Python<'_>, image: GrayArgument<'_>, timestamp_ns: i64) -> PyResult<Estimate> {
+        let view = image.view()?;
+        let tracker = &mut self.inner;
+        py.detach(|| tracker.update(view, timestamp_ns).map(|e| Estimate::from_frame(&e))).map_err(value_error)
+    }
+}
+
+/// One image, no state.
+#[pyfunction]
+#[pyo3(signature = (image, camera, mesh, *, method=None))]
+pub fn estimate(
+    py: Python<'_>,
+    image: GrayArgument<'_>,
+    camera: &Camera,
+    mesh: &Mesh,
+    method: Option<&str>,
+) -> PyResult<Estimate> {
+    Tracker::new(camera, mesh, method)?.update(py, image, 0)
+}
+
+fn config(method: Option<&str>) -> PyResult<netpose::Config> {
+    let mut config = netpose::Config::default();
+    if let Some(method) = method {
+        config.method = method.parse().map_err(value_error)?;
+    }
+    Ok(config)
+}
