@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// How the pose is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -9,6 +9,17 @@ pub enum Method {
     /// Spectra of sections, junctions of contours: Strandenes 2023.
     #[default]
     Thesis,
+}
+
+impl std::str::FromStr for Method {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "thesis" => Ok(Self::Thesis),
+            _ => Err(Error::Method { name: name.to_owned() }),
+        }
+    }
 }
 
 /// Everything that can be set. Every field has a default that serves from 0.3 to 6 m.

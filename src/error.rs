@@ -7,6 +7,12 @@ pub enum Error {
     /// The image buffer.
     #[error(transparent)]
     Image(#[from] net_image::Error),
+    /// A method that does not exist.
+    #[error("method {name:?}: there is thesis")]
+    Method {
+        /// The name that was given.
+        name: String,
+    },
     /// A parameter out of its range.
     #[error("configuration: {field} is {value}: {expected}")]
     Config {

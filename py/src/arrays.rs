@@ -1,9 +1,12 @@
 //! Numpy arrays in and out.
 
-use net_image::{GrayView, Image};
-use numpy::{PyArrayDescrMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use net_image::convert::grey_from_colour;
+use net_image::{ColourLayout, GrayView, Image};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+
+use crate::camera::value_error;
 
 /// An image argument: grey, borrowed without a copy when its rows are contiguous; colour is turned to grey.
 pub enum GrayArgument<'py> {
@@ -19,11 +22,11 @@ impl GrayArgument<'_> {
         let view = match self {
             Self::Borrowed(array) => {
                 let [height, width] = [array.shape()[0], array.shape()[1]];
-                GrayView::packed(array.as_slice().map_err(|e| PyValueError::new_err(e.to_string()))?, width, height)
+                GrayView::packed(array.as_slice().map_err(value_error)?, width, height)
             }
             Self::Converted(image) => GrayView::packed(image.data(), image.width(), image.height()),
         };
-        view.map_err(|e| PyValueError::new_err(e.to_string()))
+        view.map_err(value_error)
     }
 }
 
@@ -37,26 +40,30 @@ impl<'py> FromPyObject<'_, 'py> for GrayArgument<'py> {
             }
             let array = gray.as_array();
             let (height, width) = array.dim();
-            return Ok(Self::Converted(image_from(array.iter().copied(), width, height)?));
+            let image = Image::from_vec(array.iter().copied().collect(), width, height);
+            return Ok(Self::Converted(image.unwrap_or_default()));
         }
         if let Ok(colour) = object.extract::<PyReadonlyArray3<'py, u8>>() {
             let array = colour.as_array();
             let (height, width, channels) = array.dim();
             if channels == 3 {
-                let gray = array.rows().into_iter().map(|p| net_image::gray_from_rgb([p[0], p[1], p[2]]));
-                return Ok(Self::Converted(image_from(gray, width, height)?));
+                let packed;
+                let bytes = match array.to_slice() {
+                    Some(bytes) => bytes,
+                    None => {
+                        packed = array.iter().copied().collect::<Vec<u8>>();
+                        &packed
+                    }
+                };
+                let mut gray = Image::default();
+                grey_from_colour(bytes, width, height, 3 * width, ColourLayout::Rgb, &mut gray).map_err(value_error)?;
+                return Ok(Self::Converted(gray));
             }
         }
         let got = match object.cast::<PyUntypedArray>() {
-            Ok(array) => format!("{} of shape {:?}", array.dtype().str_()?, array.shape()),
+            Ok(array) => format!("{} of shape {:?}", array.dtype().str()?, array.shape()),
             Err(_) => object.get_type().to_string(),
         };
         Err(PyTypeError::new_err(format!("expected a numpy array, uint8 of shape (H, W) or (H, W, 3) RGB, got {got}")))
     }
-}
-
-fn image_from(pixels: impl Iterator<Item = u8>, width: usize, height: usize) -> PyResult<Image<u8>> {
-    Image::from_vec(pixels.collect(), width, height)
-        .filter(|image| image.width() > 0 && image.height() > 0)
-        .ok_or_else(|| PyValueError::new_err(format!("an image of shape ({height}, {width}) has no pixels")))
 }
