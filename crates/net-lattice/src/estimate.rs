@@ -63,7 +63,7 @@ pub(crate) struct Labels {
 
 impl Labels {
     /// Internal coordinates to (i, j).
-    pub(crate) fn from_internal(&self, s: [f64; 2]) -> Vector2<f64> {
+    pub(crate) fn net_from_sheet(&self, s: [f64; 2]) -> Vector2<f64> {
         let (p, q) = (s[0] - self.origin[0], s[1] - self.origin[1]);
         match self.turns {
             0 => Vector2::new(p, q),
@@ -75,7 +75,7 @@ impl Labels {
     }
 
     /// (i, j) to internal coordinates.
-    pub(crate) fn to_internal(self, ij: Vector2<f64>) -> [f64; 2] {
+    pub(crate) fn sheet_from_net(self, ij: Vector2<f64>) -> [f64; 2] {
         let (p, q) = match self.turns {
             0 => (ij.x, ij.y),
             1 => (-ij.y, ij.x),
@@ -147,12 +147,12 @@ impl LatticeEstimate {
     pub fn lattice_from_pixel(&self, camera: &Camera, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
         let ray = camera.ray_from_pixel(pixel)?;
         let point = self.surface.chart().at(ray.x, ray.y)?;
-        Some(self.labels.from_internal(point.s))
+        Some(self.labels.net_from_sheet(point.s))
     }
 
     /// Pixel of lattice coordinates (i, j) of the net frame, and the point's depth, m. `None` where the sheet is not seen there.
     pub fn pixel_from_lattice(&self, camera: &Camera, ij: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
-        let target = self.labels.to_internal(ij);
+        let target = self.labels.sheet_from_net(ij);
         let chart = self.surface.chart();
         // From the tangent plane, then Newton on the ray.
         let flat = self.labels.pose(&self.surface).transform({
