@@ -21,13 +21,20 @@
 
 mod error;
 mod net;
+mod random;
 mod render;
+mod scenario;
 mod scene;
 mod simulator;
+pub mod thesis;
 mod truth;
 
 pub use error::{Error, Result};
 pub use net_image::Image;
-pub use scene::{Extent, Layer, Net, NetPose, Scene, Sensor, Twine, Water};
+pub use scenario::{CameraModel, Frame, Path, Scenario};
+pub use scene::{
+    Backdrop, Extent, Growth, Hole, Kind, Layer, Light, Motion, Net, NetPose, Object, Scene, Sensor, Snow, Surface,
+    Texture, Twine, Water, Wave,
+};
 pub use simulator::Simulator;
-pub use truth::{AxisTruth, LayerTruth, NodeTruth, Truth, Visibility};
+pub use truth::{AxisTruth, LayerTruth, MissingEdge, NodeTruth, Truth, Visibility};

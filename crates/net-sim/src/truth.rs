@@ -8,12 +8,16 @@ use net_geometry::{Mesh, Plane, Pose};
 pub struct Truth {
     /// The nets, in the scene's order, nearest first.
     pub layers: Vec<LayerTruth>,
+    /// Outlines of fish and other objects in the picture, px: closed polygons.
+    pub outlines: Vec<Vec<Vector2<f64>>>,
+    /// Standard deviation of the noise on open water, grey levels.
+    pub noise_grey: f64,
 }
 
 /// The truth of one net.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerTruth {
-    /// Net to camera, in the scene's net frame (`X` along `a1`, origin at node `(0, 0)`).
+    /// Net to camera, in the scene's net frame: `X` along the first mesh direction at the net's origin, which is node `(0, 0)`.
     pub pose: Pose,
     /// The mesh as made.
     pub mesh: Mesh,
@@ -21,9 +25,14 @@ pub struct LayerTruth {
     pub axis: Option<AxisTruth>,
     /// Every knot whose centre is in the picture, row by row.
     pub nodes: Vec<NodeTruth>,
+    /// Every broken piece of twine with an end in the picture.
+    pub missing_edges: Vec<MissingEdge>,
+    /// How much brighter the twine is than what is behind it, in the middle of the picture and were it wide: grey levels, negative
+    /// for a dark net.
+    pub contrast_grey: f64,
 }
 
-/// The net where the optical axis meets it.
+/// The net where the optical axis meets it, jitter left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisTruth {
     /// Camera centre to net along the axis, m.
@@ -32,10 +41,14 @@ pub struct AxisTruth {
     pub distance_m: f64,
     /// Unit normal in the camera frame, `z > 0`.
     pub normal: Vector3<f64>,
-    /// Lattice coordinates of the point, cells; the whole part is the node.
+    /// Lattice coordinates of the point, cells.
     pub cells: Vector2<f64>,
+    /// First and second mesh direction there in the camera frame, unit vectors.
+    pub directions: [Vector3<f64>; 2],
     /// Angle from the first to the second mesh direction there, rad.
     pub crossing_angle: f64,
+    /// Principal curvatures there, 1/m, the larger first; positive bends away from the camera at the sides.
+    pub curvatures_per_m: [f64; 2],
 }
 
 impl AxisTruth {
@@ -54,8 +67,21 @@ pub struct NodeTruth {
     pub pixel: Vector2<f64>,
     /// Depth along the optical axis (camera-frame z), m.
     pub depth_m: f64,
+    /// In the camera frame, m.
+    pub point: Vector3<f64>,
     /// Whether it can be seen.
     pub visibility: Visibility,
+}
+
+/// A broken piece of twine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MissingEdge {
+    /// The neighbouring knots it joined.
+    pub nodes: [(i32, i32); 2],
+    /// Their pixels.
+    pub pixels: [Vector2<f64>; 2],
+    /// What is left of it at either end, m; 0 for nothing.
+    pub stubs_m: [f64; 2],
 }
 
 /// Whether a knot can be seen. Geometric: water, blur and noise are not counted.

@@ -222,14 +222,17 @@ fn a_net_that_fills_the_view_has_all_its_knots() -> Result {
     for pose in poses() {
         let scene = scene("50x40mm@75deg", pose)?;
         let layer = &simulator.render(&scene, 1, &mut image)?.layers[0];
-        // Near the end of sight (12 m) a knot may be in or out.
-        let listed: BTreeSet<_> = layer.nodes.iter().filter(|n| n.depth_m < 11.0).map(|n| n.index).collect();
+        // Near the end of sight (four times the range at least) a knot may be in or out.
+        let listed: BTreeSet<_> =
+            layer.nodes.iter().filter(|n| n.point.norm() < 3.9 * pose.range_m).map(|n| n.index).collect();
         let mut expected = BTreeSet::new();
         for j in -450..450 {
             for i in -450..450 {
                 let flat = layer.mesh.node(f64::from(i), f64::from(j));
                 let point = layer.pose.transform(Vector3::new(flat.x, flat.y, 0.0));
-                let Some(p) = camera.pixel_from_point(point).filter(|_| point.z < 11.0) else { continue };
+                let Some(p) = camera.pixel_from_point(point).filter(|_| point.norm() < 3.9 * pose.range_m) else {
+                    continue;
+                };
                 if p.x >= -0.5 && p.y >= -0.5 && p.x < 847.5 && p.y < 479.5 {
                     expected.insert((i, j));
                 }

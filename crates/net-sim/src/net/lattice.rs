@@ -1,24 +1,28 @@
 //! The knots in view, row by row.
 
 use nalgebra::{Vector2, Vector3};
-use net_geometry::{Camera, Mesh, Pose};
+use net_geometry::{Camera, Pose};
 
-use super::region::Region;
+use super::fabric::Fabric;
+use super::region::{MARGIN_PX, Region};
+use crate::random::{Addressed, Stream};
 use crate::scene::Net;
 
 /// Knots nearer than this are not drawn, m: the twine would fill the view.
 const NEAR_M: f64 = 0.02;
+/// At most so many knots along a direction: a net seen edge-on would have no end of them.
+const MOST_KNOTS: i32 = 1600;
 
 /// A knot.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
     /// In the camera frame, m.
     pub(crate) point: Vector3<f64>,
-    /// In the picture; NaN behind the camera or beyond the lens.
+    /// In the picture; NaN where there is no knot, behind the camera, or beyond the lens.
     pub(crate) pixel: Vector2<f64>,
 }
 
-/// Knots `first..first + len` of row `j`, at `start` in the list.
+/// Knots `first..first + len` of a row, at `start` in the list.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     first: i32,
@@ -35,21 +39,116 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    /// Lays out the knots of a flat net and projects them.
-    pub(crate) fn lay_out(&mut self, net: &Net, mesh: &Mesh, pose: &Pose, camera: &Camera, region: &Region) {
+    /// Lays out the knots of `net` and projects them.
+    pub(crate) fn lay_out(
+        &mut self,
+        net: &Net,
+        fabric: &mut Fabric,
+        pose: &Pose,
+        camera: &Camera,
+        region: &mut Region,
+        far_m: f64,
+    ) {
         self.rows.clear();
         self.nodes.clear();
-        let Some((first_row, last_row)) = region.rows(&net.extent) else { return };
+        region.look(camera, pose, fabric.mesh(), far_m);
+        if net.surface.is_flat() {
+            self.lay_out_flat(net, fabric, pose, camera, region);
+        } else {
+            self.lay_out_bent(net, fabric, pose, camera, region, far_m);
+        }
+    }
+
+    /// Row by row as far as the view goes.
+    fn lay_out_flat(&mut self, net: &Net, fabric: &Fabric, pose: &Pose, camera: &Camera, region: &Region) {
+        let Some((first_row, last_row)) = region.rows(net.extent.rows()) else { return };
         self.first_row = first_row;
         for j in first_row..=last_row {
-            let (first, last) = region.columns(j, &net.extent).unwrap_or((0, -1));
-            self.rows.push(Row { first, len: (last - first + 1) as usize, start: self.nodes.len() });
-            for i in first..=last {
-                let flat = mesh.node(f64::from(i), f64::from(j));
-                let point = pose.transform(Vector3::new(flat.x, flat.y, 0.0));
-                let pixel = (point.z >= NEAR_M).then(|| camera.pixel_from_point(point)).flatten();
-                self.nodes.push(Node { point, pixel: pixel.unwrap_or(Vector2::repeat(f64::NAN)) });
+            let (first, last) = region.columns(j, net.extent.columns()).unwrap_or((0, -1));
+            self.push_row(net, fabric, pose, camera, j, [first, last], f64::INFINITY);
+        }
+    }
+
+    /// A rectangle of knots, widened until its border is out of sight.
+    fn lay_out_bent(
+        &mut self,
+        net: &Net,
+        fabric: &mut Fabric,
+        pose: &Pose,
+        camera: &Camera,
+        region: &Region,
+        far_m: f64,
+    ) {
+        let Some((mut columns, mut rows)) = region.bounds() else { return };
+        let limit = |[low, high]: [i32; 2], ends: Option<[i32; 2]>| {
+            let [first, last] = ends.unwrap_or([i32::MIN / 4, i32::MAX / 4]);
+            let middle = (low + high) / 2;
+            let half = MOST_KNOTS / 2;
+            [low.max(first).max(middle - half), high.min(last).min(middle + half)]
+        };
+        for _ in 0..6 {
+            columns = limit(columns, net.extent.columns());
+            rows = limit(rows, net.extent.rows());
+            if columns[0] > columns[1] || rows[0] > rows[1] {
+                return;
             }
+            // Three knots more for those who interpolate near the border.
+            fabric.lay(net, [columns[0] - 3, columns[1] + 3], [rows[0] - 3, rows[1] + 3]);
+            self.rows.clear();
+            self.nodes.clear();
+            self.first_row = rows[0];
+            for j in rows[0]..=rows[1] {
+                self.push_row(net, fabric, pose, camera, j, columns, far_m);
+            }
+            let seen = |i: i32, j: i32| self.node(i, j).is_some_and(|n| near_picture(n.pixel, camera));
+            let more = |span: [i32; 2]| (span[1] - span[0]) / 6 + 6;
+            let (left, right) =
+                ((rows[0]..=rows[1]).any(|j| seen(columns[0], j)), (rows[0]..=rows[1]).any(|j| seen(columns[1], j)));
+            let (top, bottom) = (
+                (columns[0]..=columns[1]).any(|i| seen(i, rows[0])),
+                (columns[0]..=columns[1]).any(|i| seen(i, rows[1])),
+            );
+            if !(left || right || top || bottom) {
+                break;
+            }
+            let (wide, high) = (more(columns), more(rows));
+            let grown = |[low, high]: [i32; 2], at_low: bool, at_high: bool, by: i32| {
+                [low - i32::from(at_low) * by, high + i32::from(at_high) * by]
+            };
+            let (wider, higher) = (grown(columns, left, right, wide), grown(rows, top, bottom, high));
+            if limit(wider, net.extent.columns()) == columns && limit(higher, net.extent.rows()) == rows {
+                break;
+            }
+            (columns, rows) = (wider, higher);
+        }
+    }
+
+    fn push_row(
+        &mut self,
+        net: &Net,
+        fabric: &Fabric,
+        pose: &Pose,
+        camera: &Camera,
+        j: i32,
+        [first, last]: [i32; 2],
+        far_m: f64,
+    ) {
+        self.rows.push(Row { first, len: (last - first + 1) as usize, start: self.nodes.len() });
+        let (a1, a2) = (fabric.mesh().a1(), fabric.mesh().a2());
+        let along = [Addressed::new(net.seed, Stream::JitterX), Addressed::new(net.seed, Stream::JitterY)];
+        for i in first..=last {
+            let knot = fabric.knot(i, j).map(|ideal| {
+                if net.jitter == 0.0 {
+                    return ideal;
+                }
+                let [x, y] = along.map(|a| net.jitter * a.normal(i64::from(i), i64::from(j), 0));
+                let off = a1 * x + a2 * y;
+                ideal + Vector3::new(off.x, off.y, fabric.sheet().height(ideal.xy()).1.dot(&off))
+            });
+            let point = knot.map_or(Vector3::repeat(f64::NAN), |k| pose.transform(k));
+            let visible = point.z >= NEAR_M && point.norm() <= far_m;
+            let pixel = if visible { camera.pixel_from_point(point) } else { None };
+            self.nodes.push(Node { point, pixel: pixel.unwrap_or(Vector2::repeat(f64::NAN)) });
         }
     }
 
@@ -84,4 +183,10 @@ impl Lattice {
         let last = rows.map(|r| r.first + r.len as i32 - 1).max().unwrap_or(-1);
         (first, last)
     }
+}
+
+/// Whether something there can reach into the picture.
+fn near_picture(p: Vector2<f64>, camera: &Camera) -> bool {
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
+    p.x > -MARGIN_PX && p.y > -MARGIN_PX && p.x < width + MARGIN_PX && p.y < height + MARGIN_PX
 }

@@ -3,10 +3,8 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 use net_geometry::{Camera, Mesh, Pose};
 
-use crate::scene::Extent;
-
 /// Nets are drawn to this far beyond the picture, px: what blurs or moves into it starts there.
-const MARGIN_PX: f64 = 48.0;
+pub(crate) const MARGIN_PX: f64 = 48.0;
 /// Spacing of the rays that probe the view, px.
 const PROBE_PX: f64 = 16.0;
 
@@ -19,8 +17,8 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// Finds what the camera sees of the plane `Z = 0` no deeper than `max_depth_m`.
-    pub(crate) fn look(&mut self, camera: &Camera, pose: &Pose, mesh: &Mesh, max_depth_m: f64) {
+    /// Finds what the camera sees of the plane `Z = 0` no farther away than `far_m`.
+    pub(crate) fn look(&mut self, camera: &Camera, pose: &Pose, mesh: &Mesh, far_m: f64) {
         self.scratch.clear();
         let plane = pose.plane();
         let cells_from_net = Matrix2::from_columns(&[mesh.a1(), mesh.a2()]).try_inverse().unwrap_or_default();
@@ -30,7 +28,7 @@ impl Region {
                 let pixel = Vector2::new(column as f64, row as f64) * PROBE_PX - Vector2::repeat(MARGIN_PX);
                 let Some(ray) = camera.ray_from_pixel(pixel) else { continue };
                 // Depth along z, and the ray has z = 1.
-                let Some(depth) = plane.depth_along(ray).filter(|&d| d <= max_depth_m) else { continue };
+                let Some(depth) = plane.depth_along(ray).filter(|&d| d * ray.norm() <= far_m) else { continue };
                 let point: Vector3<f64> = pose.inverse_transform(ray * depth);
                 self.scratch.push(cells_from_net * point.xy());
             }
@@ -38,15 +36,26 @@ impl Region {
         convex_hull(&mut self.scratch, &mut self.hull);
     }
 
+    /// Columns and rows that hold the view and a tenth more, for nets that leave their plane.
+    pub(crate) fn bounds(&self) -> Option<([i32; 2], [i32; 2])> {
+        let ends = |of: fn(&Vector2<f64>) -> f64| {
+            let low = self.hull.iter().map(of).fold(f64::INFINITY, f64::min);
+            let high = self.hull.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            let more = 0.1 * (high - low) + 2.0;
+            clip((low - more).floor(), (high + more).ceil(), None).map(|(low, high)| [low, high])
+        };
+        Some((ends(|p| p.x)?, ends(|p| p.y)?))
+    }
+
     /// First and last row of knots in view, `None` if there is none.
-    pub(crate) fn rows(&self, extent: &Extent) -> Option<(i32, i32)> {
+    pub(crate) fn rows(&self, ends: Option<[i32; 2]>) -> Option<(i32, i32)> {
         let low = self.hull.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
         let high = self.hull.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        clip(low.floor(), high.ceil(), extent.rows())
+        clip(low.floor(), high.ceil(), ends)
     }
 
     /// First and last knot in view of row `j`, one more than the view at each end.
-    pub(crate) fn columns(&self, j: i32, extent: &Extent) -> Option<(i32, i32)> {
+    pub(crate) fn columns(&self, j: i32, ends: Option<[i32; 2]>) -> Option<(i32, i32)> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         // The band between the neighbouring rows: a row that only touches a corner of the view counts too.
         for y in [f64::from(j) - 1.0, f64::from(j), f64::from(j) + 1.0] {
@@ -63,7 +72,7 @@ impl Region {
                 }
             }
         }
-        clip(low.floor() - 1.0, high.ceil() + 1.0, extent.columns())
+        clip(low.floor() - 1.0, high.ceil() + 1.0, ends)
     }
 }
 

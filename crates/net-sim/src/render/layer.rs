@@ -1,134 +1,401 @@
-//! One net on the picture: twines of both directions as strokes.
+//! One net on the picture: twines of both directions as strokes, then knots and growth over them.
 
 use nalgebra::{Vector2, Vector3};
-use net_geometry::Camera;
+use net_geometry::{Lens, Pose};
 
-use super::profile::EdgeSpread;
+use super::profile::{DiscSpread, EdgeSpread, REACH_SIGMA};
 use super::stroke::{End, Family, Stroke, Vertex};
+use super::water::Medium;
+use crate::net::damage::{Damage, Edge};
+use crate::net::fabric::Fabric;
 use crate::net::lattice::{Lattice, Node};
-use crate::scene::{Net, Scene};
+use crate::random::{Addressed, Stream};
+use crate::scene::Net;
 
-/// Straight pieces are joined up to this length, px: short enough for light and width to be linear along it.
+/// Longest piece of straight twine drawn in one, px: light and width are linear along it.
 const PIECE_PX: f64 = 32.0;
+/// Longest piece of curved twine: a parabola follows it to 0.001 px through any lens that keeps a picture together.
+const CURVED_PIECE_PX: f64 = 20.0;
+
+/// A net to be drawn, and where.
+#[derive(Clone, Copy)]
+pub(crate) struct Subject<'a> {
+    pub(crate) net: &'a Net,
+    pub(crate) fabric: &'a Fabric,
+    pub(crate) lattice: &'a Lattice,
+    pub(crate) pose: &'a Pose,
+    pub(crate) medium: &'a Medium<'a>,
+    /// Distance at which the net is out of sight, m.
+    pub(crate) far_m: f64,
+}
+
+/// Over the last quarter of the way to where they are out of sight twines fade, lest the net seem to end there.
+const FADE: f64 = 0.25;
 
 /// Draws nets onto pictures; owns what that takes.
 #[derive(Debug)]
 pub(crate) struct LayerPainter {
     edge: EdgeSpread,
+    disc: DiscSpread,
     /// Twines along the first and along the second mesh direction.
     families: [Family; 2],
-    /// The twine being drawn.
-    twine: Vec<Vertex>,
+    /// The unbroken stretch of twine being drawn.
+    stretch: Vec<Stroke>,
+    /// Knots under growth, sorted.
+    fouled: Vec<(i32, i32)>,
 }
 
 impl LayerPainter {
     pub(crate) fn new() -> Self {
-        Self { edge: EdgeSpread::new(), families: Default::default(), twine: Vec::new() }
+        Self {
+            edge: EdgeSpread::new(),
+            disc: DiscSpread::new(),
+            families: Default::default(),
+            stretch: Vec::new(),
+            fouled: Vec::new(),
+        }
     }
 
-    /// Draws `net`, whose knots `lattice` holds, over what `picture` shows.
-    pub(crate) fn paint(&mut self, scene: &Scene, net: &Net, lattice: &Lattice, camera: &Camera, picture: &mut [f32]) {
-        let (width, height) = (camera.width() as usize, camera.height() as usize);
+    pub(crate) fn edge(&self) -> &EdgeSpread {
+        &self.edge
+    }
+
+    pub(crate) fn disc(&self) -> &DiscSpread {
+        &self.disc
+    }
+
+    /// Whether growth covers knot `index` of the net drawn last.
+    pub(crate) fn is_fouled(&self, index: (i32, i32)) -> bool {
+        self.fouled.binary_search(&index).is_ok()
+    }
+
+    /// Share of the pixel nearest to `p` that twines of the net drawn last cover.
+    pub(crate) fn cover(&self, p: Vector2<f64>) -> f32 {
+        1.0 - self.families.iter().map(|f| 1.0 - f.at(p).min(1.0)).product::<f32>()
+    }
+
+    /// Draws a net over what `picture` shows.
+    pub(crate) fn paint(&mut self, subject: &Subject, picture: &mut [f32]) {
+        let camera = subject.medium.camera();
         for family in &mut self.families {
-            family.clear(width, height);
+            family.clear(camera.width() as usize, camera.height() as usize);
         }
-        let (first_row, last_row) = lattice.row_range();
-        let (first_column, last_column) = lattice.column_range();
+        let (first_row, last_row) = subject.lattice.row_range();
+        let (first_column, last_column) = subject.lattice.column_range();
         for j in first_row..=last_row {
-            self.follow(0, scene, net, camera, (first_column..=last_column).map(|i| lattice.node(i, j)));
+            self.follow(subject, 0, (first_column..=last_column).map(|i| (i, j)));
         }
         for i in first_column..=last_column {
-            self.follow(1, scene, net, camera, (first_row..=last_row).map(|j| lattice.node(i, j)));
+            self.follow(subject, 1, (first_row..=last_row).map(|j| (i, j)));
         }
         let [first, second] = &self.families;
         let twines = first.coverage.iter().zip(&first.light).zip(second.coverage.iter().zip(&second.light));
         for (out, ((&c1, &l1), (&c2, &l2))) in picture.iter_mut().zip(twines) {
             let sum = c1 + c2;
             if sum > 0.0 {
-                // Crossing twines overlap: the blurred union of two crossing strips is 1 - (1 - c1)(1 - c2).
+                // The blurred union of two strips that cross at right angles.
                 let cover = 1.0 - (1.0 - c1.min(1.0)) * (1.0 - c2.min(1.0));
                 *out += cover * ((l1 + l2) / sum - *out);
             }
         }
+        if subject.net.twine.knot > 1.0 {
+            self.knots(subject, picture);
+        }
+        self.fouled.clear();
+        if subject.net.growth.density > 0.0 {
+            self.growth(subject, picture);
+        }
     }
 
-    /// Draws one twine, knot by knot; it is interrupted where there is none.
-    fn follow<'a>(
-        &mut self,
-        family: usize,
-        scene: &Scene,
-        net: &Net,
-        camera: &Camera,
-        nodes: impl Iterator<Item = Option<&'a Node>>,
-    ) {
-        self.twine.clear();
-        let mut last: Option<&Node> = None;
-        let mut pending: Option<Vertex> = None;
-        for node in nodes.chain(std::iter::once(None)) {
-            match (node, last) {
-                (Some(node), previous) => {
-                    let direction = previous.map(|p| node.point - p.point);
-                    let vertex = vertex(scene, net, camera, node, direction);
-                    if previous.is_none() {
-                        self.twine.push(vertex);
-                    } else {
-                        let far = self.twine.last().is_none_or(|v| (vertex.pixel - v.pixel).norm() > PIECE_PX);
-                        if let Some(kept) = pending.take().filter(|_| far) {
-                            self.twine.push(kept);
-                        }
-                        pending = Some(vertex);
+    /// Draws one twine through these knots; it is interrupted where it is broken or where there is none.
+    fn follow(&mut self, subject: &Subject, family: usize, knots: impl Iterator<Item = (i32, i32)>) {
+        let damage = Damage::of(subject.net);
+        let pieces = Pieces::of(subject);
+        // Straight twine is drawn several meshes at a time: from this knot.
+        let mut anchor: Option<&Node> = None;
+        let mut last: Option<((i32, i32), &Node)> = None;
+        self.stretch.clear();
+        for index in knots.map(Some).chain(std::iter::once(None)) {
+            let node = index.and_then(|(i, j)| Some(((i, j), subject.lattice.node(i, j)?)));
+            let Some(((from_index, from), to)) = last.map(|l| (l, node)) else {
+                last = node;
+                anchor = node.map(|n| n.1);
+                continue;
+            };
+            let edge = Edge { i: from_index.0, j: from_index.1, family };
+            let Some((_, to)) = to else {
+                self.end_stretch(subject, family, anchor, from, edge, &pieces);
+                (last, anchor) = (None, None);
+                continue;
+            };
+            if damage.broken(edge) {
+                self.end_stretch(subject, family, anchor, from, edge, &pieces);
+                self.stubs(subject, edge, [from, to], &damage);
+                anchor = Some(to);
+            } else if pieces.straight {
+                if let Some(start) = anchor.filter(|a| (to.pixel - a.pixel).norm() > PIECE_PX) {
+                    if !std::ptr::eq(start, from) {
+                        pieces.push(edge, start, from, &mut self.stretch);
                     }
+                    anchor = Some(from);
                 }
-                (None, Some(_)) => {
-                    self.twine.extend(pending.take());
-                    // The first knot had no neighbour to tell which way the twine runs when its width was taken.
-                    if let [first, second, ..] = self.twine[..] {
-                        self.twine[0] = Vertex {
-                            width_px: if first.width_px.is_nan() { second.width_px } else { first.width_px },
-                            ..first
-                        };
-                    }
-                    self.stroke(family, scene);
-                    self.twine.clear();
-                }
-                (None, None) => {}
+            } else {
+                pieces.push(edge, from, to, &mut self.stretch);
+                anchor = Some(to);
             }
             last = node;
         }
     }
 
-    /// Draws the collected twine.
-    fn stroke(&mut self, family: usize, scene: &Scene) {
-        let vertices = &self.twine;
-        let tangent = |k: usize| {
-            let back = vertices[k].pixel - vertices[k - 1].pixel;
-            let ahead = vertices[k + 1].pixel - vertices[k].pixel;
-            (back.normalize() + ahead.normalize()).try_normalize(1e-9).unwrap_or(ahead)
+    /// Draws the collected stretch, which ends at `to`.
+    fn end_stretch(
+        &mut self,
+        subject: &Subject,
+        family: usize,
+        anchor: Option<&Node>,
+        to: &Node,
+        edge: Edge,
+        pieces: &Pieces,
+    ) {
+        if let Some(start) = anchor.filter(|a| !std::ptr::eq(*a, to)) {
+            pieces.push(edge, start, to, &mut self.stretch);
+        }
+        let strokes = &mut self.stretch;
+        for k in 1..strokes.len() {
+            let (back, ahead) = (strokes[k - 1].tangents()[1], strokes[k].tangents()[0]);
+            let cut = End::Joint((back + ahead).try_normalize(1e-9).unwrap_or(ahead));
+            strokes[k - 1].end = cut;
+            strokes[k].start = cut;
+        }
+        let sigma = subject.medium.scene().sensor.psf_px;
+        for stroke in strokes.drain(..) {
+            stroke.draw(&mut self.families[family], &self.edge, sigma);
+        }
+    }
+
+    /// Draws what is left of a broken piece of twine.
+    fn stubs(&mut self, subject: &Subject, edge: Edge, nodes: [&Node; 2], damage: &Damage) {
+        let pieces = Pieces::of(subject);
+        for end in 0..2 {
+            let Some((share, [turn, lift])) = damage.stub(edge, end) else { continue };
+            let (root, other) = (nodes[end].point, nodes[1 - end].point);
+            let out = subject.pose.normal();
+            let way = other - root;
+            let sideways = out.cross(&way);
+            // Frayed twine leaves its old direction by up to 60 degrees and curls out of the net.
+            let direction = way + sideways * (1.7 * turn) + out * (0.6 * lift * way.norm());
+            let tip = root + direction * (share * way.norm() / direction.norm().max(1e-12));
+            let Some(pixel) = subject.medium.camera().pixel_from_point(tip) else { continue };
+            let tip = Node { point: tip, pixel };
+            pieces.push(edge, nodes[end], &tip, &mut self.stretch);
+            let sigma = subject.medium.scene().sensor.psf_px;
+            for stroke in self.stretch.drain(..) {
+                stroke.draw(&mut self.families[edge.family], &self.edge, sigma);
+            }
+        }
+    }
+
+    /// Draws the knots.
+    fn knots(&mut self, subject: &Subject, picture: &mut [f32]) {
+        let damage = Damage::of(subject.net);
+        let size = Addressed::new(subject.net.seed, Stream::Knot);
+        for (index, node) in subject.lattice.iter() {
+            if damage.gone(index.0, index.1) {
+                continue;
+            }
+            // Tied by hand or machine, they differ by a tenth.
+            let vary = 1.0 + 0.1 * size.normal(i64::from(index.0), i64::from(index.1), 0).clamp(-2.0, 2.0);
+            let diameter = subject.net.twine.diameter_m * subject.net.twine.knot * vary;
+            self.blob(subject, node.point, 0.5 * diameter, subject.net.twine.grey, picture);
+        }
+    }
+
+    /// Draws tufts, and notes which knots they cover.
+    fn growth(&mut self, subject: &Subject, picture: &mut [f32]) {
+        let growth = &subject.net.growth;
+        let (place, tuft) =
+            (Addressed::new(subject.net.seed, Stream::Growth), Addressed::new(subject.net.seed, Stream::Tuft));
+        let damage = Damage::of(subject.net);
+        let inverse = subject.pose.rotation.inverse();
+        for (index, node) in subject.lattice.iter() {
+            for family in 0..2 {
+                let edge = Edge { i: index.0, j: index.1, family };
+                let [_, (i, j)] = edge.ends();
+                let Some(next) = subject.lattice.node(i, j) else { continue };
+                let at = (inverse * (node.point - subject.pose.translation)).xy() / growth.patch_m;
+                // A smooth field of mean 1 and as uneven as asked for.
+                let patch = (1.0 + growth.patchiness * 1.6 * place.fractal(at.x, at.y, 2)).max(0.0);
+                let (a, b, c) = edge.address(0);
+                if damage.broken(edge) || place.uniform(a, b, c) >= growth.density * patch {
+                    continue;
+                }
+                let number = |k: i64, low: f64, high: f64| {
+                    let (a, b, c) = edge.address(k);
+                    tuft.between(low, high, a, b, c)
+                };
+                let centre = node.point + (next.point - node.point) * number(0, 0.0, 1.0);
+                let size = growth.size_m * number(1, 0.4, 1.6);
+                for k in 0..5 {
+                    let spread = 0.45 * size;
+                    let off = Vector3::new(
+                        number(10 + 4 * k, -spread, spread),
+                        number(11 + 4 * k, -spread, spread),
+                        -spread.abs() * number(12 + 4 * k, 0.0, 1.0),
+                    );
+                    let radius = size * number(13 + 4 * k, 0.15, 0.38);
+                    self.blob(subject, centre + off, radius, growth.grey * (0.8 + 0.1 * k as f64), picture);
+                }
+                for (end, knot) in edge.ends().into_iter().zip([node, next]) {
+                    if (knot.point - centre).norm() < 0.5 * size {
+                        self.fouled.push(end);
+                    }
+                }
+            }
+        }
+        self.fouled.sort_unstable();
+        self.fouled.dedup();
+    }
+
+    /// Draws a ball of this brightness.
+    fn blob(&self, subject: &Subject, point: Vector3<f64>, radius_m: f64, grey: f64, picture: &mut [f32]) {
+        let camera = subject.medium.camera();
+        let Some(pixel) = camera.pixel_from_point(point).filter(|_| point.z > 0.02) else { return };
+        let radius_px = radius_m * 0.5 * (camera.fx() + camera.fy()) / point.z;
+        let place = subject.pose.inverse_transform(point).xy();
+        let grey = subject.medium.seen(grey, point, pixel, place) as f32;
+        let spot = Spot { pixel, radius_px, grey, strength: 1.0 };
+        let sigma = subject.medium.scene().sensor.psf_px;
+        spot.draw(&self.disc, &self.edge, sigma, camera.width() as usize, picture);
+    }
+}
+
+/// A disc on the picture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spot {
+    pub(crate) pixel: Vector2<f64>,
+    pub(crate) radius_px: f64,
+    pub(crate) grey: f32,
+    /// Share of what is behind it that it hides.
+    pub(crate) strength: f32,
+}
+
+impl Spot {
+    /// Draws it over what `picture` shows.
+    pub(crate) fn draw(&self, disc: &DiscSpread, edge: &EdgeSpread, sigma: f64, width: usize, picture: &mut [f32]) {
+        let height = picture.len() / width;
+        let reach = self.radius_px + REACH_SIGMA * sigma;
+        let span = |centre: f64, size: usize| {
+            let low = (centre - reach).ceil().max(0.0);
+            let high = (centre + reach).floor().min(size as f64 - 1.0);
+            (low <= high).then_some(low as usize..high as usize + 1)
         };
-        let joint = |k: usize| if k == 0 || k + 1 >= vertices.len() { End::Free } else { End::Joint(tangent(k)) };
-        for k in 0..vertices.len().saturating_sub(1) {
-            let piece =
-                Stroke { from: vertices[k], to: vertices[k + 1], bow_px: 0.0, start: joint(k), end: joint(k + 1) };
-            piece.draw(&mut self.families[family], &self.edge, scene.sensor.psf_px);
+        let (Some(columns), Some(rows)) = (span(self.pixel.x, width), span(self.pixel.y, height)) else { return };
+        let radius = (self.radius_px / sigma) as f32;
+        for v in rows {
+            for u in columns.clone() {
+                let distance = (Vector2::new(u as f64, v as f64) - self.pixel).norm() / sigma;
+                let cover = self.strength * disc.coverage(distance as f32, radius, edge);
+                let out = &mut picture[v * width + u];
+                *out += cover * (self.grey - *out);
+            }
         }
     }
 }
 
-/// A knot as a point of its twine, which runs in `direction` (camera frame).
-fn vertex(_scene: &Scene, net: &Net, camera: &Camera, node: &Node, direction: Option<Vector3<f64>>) -> Vertex {
-    let width_px = direction.map_or(f64::NAN, |d| apparent_width(camera, node, d, net.twine.diameter_m));
-    Vertex { pixel: node.pixel, width_px, grey: net.twine.grey }
+/// Cuts twine into strokes.
+struct Pieces<'a> {
+    subject: &'a Subject<'a>,
+    /// Whether straight lines stay straight, so that neighbouring meshes of a twine may be drawn in one.
+    straight: bool,
+    /// Whether a stroke needs its middle looked up.
+    curved: bool,
+    slack: [Addressed; 2],
+    brightness: Addressed,
 }
 
-/// Width in the picture, px, of a cylinder of this diameter through `node`: its outline is where the line of sight touches it,
-/// half a diameter to either side of the axis, across both the twine and the line of sight.
-fn apparent_width(camera: &Camera, node: &Node, direction: Vector3<f64>, diameter_m: f64) -> f64 {
-    let width = || {
-        let side = direction.cross(&node.point).try_normalize(1e-12)?;
-        let edge = camera.pixel_from_point(node.point + side * (0.5 * diameter_m))? - node.pixel;
-        let ahead = camera.pixel_from_point(node.point + direction * 0.01)? - node.pixel;
-        let ahead: Vector2<f64> = ahead.try_normalize(1e-12)?;
-        Some(2.0 * ahead.perp(&edge).abs())
-    };
-    width().unwrap_or(0.0)
+impl<'a> Pieces<'a> {
+    fn of(subject: &'a Subject<'a>) -> Self {
+        let net = subject.net;
+        let bent_by_lens = *subject.medium.camera().lens() != Lens::None;
+        Self {
+            subject,
+            straight: net.is_straight() && !bent_by_lens,
+            curved: bent_by_lens || net.slack > 0.0,
+            slack: [Addressed::new(net.seed, Stream::SlackIn), Addressed::new(net.seed, Stream::SlackOut)],
+            brightness: Addressed::new(net.seed, Stream::TwineGrey),
+        }
+    }
+
+    /// Appends the strokes of the twine from one node to another, which is (or begins at) `edge`.
+    fn push(&self, edge: Edge, from: &Node, to: &Node, strokes: &mut Vec<Stroke>) {
+        let Subject { net, pose, medium, far_m, .. } = *self.subject;
+        let camera = medium.camera();
+        let chord = to.point - from.point;
+        let length_px = (to.pixel - from.pixel).norm();
+        let piece_px = if self.curved { CURVED_PIECE_PX } else { PIECE_PX };
+        // Far outside the picture a piece is not worth cutting.
+        let count = if length_px > 5000.0 { 1 } else { (length_px / piece_px).ceil().max(1.0) as usize };
+        let (a, b, c) = edge.address(0);
+        let bow = if net.slack > 0.0 {
+            let across = pose.normal().cross(&chord);
+            let [inward, outward] = self.slack.map(|s| net.slack * s.normal(a, b, c));
+            across * inward + pose.normal() * (chord.norm() * outward)
+        } else {
+            Vector3::zeros()
+        };
+        let brightness = if net.twine.variation > 0.0 {
+            (1.0 + net.twine.variation * self.brightness.normal(a, b, c)).clamp(0.2, 2.0)
+        } else {
+            1.0
+        };
+        let at = |t: f64| from.point + chord * t + bow * (4.0 * t * (1.0 - t));
+        let vertex = |t: f64, node: Option<&Node>| {
+            let point = node.map_or_else(|| at(t), |n| n.point);
+            let pixel = node.map_or_else(|| camera.pixel_from_point(point), |n| Some(n.pixel))?;
+            let direction = chord + bow * (4.0 - 8.0 * t);
+            let fade = ((1.0 - point.norm() / far_m) / FADE).clamp(0.0, 1.0);
+            let width_px = self.apparent_width(point, pixel, direction) * fade;
+            let place = pose.inverse_transform(point).xy();
+            let grey = medium.seen(net.twine.grey * brightness, point, pixel, place);
+            Some(Vertex { pixel, width_px, grey })
+        };
+        let Some(mut start) = vertex(0.0, Some(from)) else { return };
+        for k in 1..=count {
+            let t = k as f64 / count as f64;
+            let Some(end) = vertex(t, if k == count { Some(to) } else { None }) else { return };
+            let bow_px = if self.curved { self.bow(at(t - 0.5 / count as f64), start.pixel, end.pixel) } else { 0.0 };
+            let along = (end.pixel - start.pixel).try_normalize(1e-9).unwrap_or(Vector2::x());
+            let shade = net.twine.shading * Vector2::new(-along.y, along.x).dot(&medium.towards_light());
+            strokes.push(Stroke { from: start, to: end, bow_px, shade, start: End::Free, end: End::Free });
+            start = end;
+        }
+    }
+
+    /// How far the picture of `middle` lies off the chord, brought to the chord's middle by a parabola.
+    fn bow(&self, middle: Vector3<f64>, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+        let bow = || {
+            let pixel = self.subject.medium.camera().pixel_from_point(middle)?;
+            let chord = to - from;
+            let along = chord.try_normalize(1e-9)?;
+            let t = (pixel - from).dot(&along) / chord.norm();
+            let bend = 4.0 * t * (1.0 - t);
+            (bend > 0.2).then(|| along.perp(&(pixel - from)) / bend)
+        };
+        bow().unwrap_or(0.0)
+    }
+
+    /// Width in the picture, px, of a cylinder through `point`: its outline is where the line of sight touches it, half a diameter
+    /// to either side of the axis, across both the twine and the line of sight.
+    fn apparent_width(&self, point: Vector3<f64>, pixel: Vector2<f64>, direction: Vector3<f64>) -> f64 {
+        let camera = self.subject.medium.camera();
+        let width = || {
+            let side = direction.cross(&point).try_normalize(1e-12)?;
+            let radius = 0.5 * self.subject.net.twine.diameter_m;
+            let edge = camera.pixel_from_point(point + side * radius)? - pixel;
+            let step = direction.try_normalize(1e-12)? * (1e-3 * point.z);
+            let ahead = (camera.pixel_from_point(point + step)? - pixel).try_normalize(1e-12)?;
+            Some(2.0 * ahead.perp(&edge).abs())
+        };
+        width().unwrap_or(0.0)
+    }
 }

@@ -1,6 +1,12 @@
-//! From a scene to a picture, in the order light goes: backdrop, nets from back to front, sensor.
+//! From a scene to a picture, in the order light goes: open water, backdrop, nets and objects from back to front, snow, lens, sensor.
 
+pub(crate) mod backdrop;
+pub(crate) mod blur;
+pub(crate) mod jpeg;
 pub(crate) mod layer;
+pub(crate) mod object;
 pub(crate) mod profile;
 pub(crate) mod sensor;
+pub(crate) mod snow;
 pub(crate) mod stroke;
+pub(crate) mod water;

@@ -26,6 +26,13 @@ impl Family {
         }
         (self.width, self.height) = (width, height);
     }
+
+    /// Coverage of the pixel nearest to `p`; nothing outside.
+    pub(crate) fn at(&self, p: Vector2<f64>) -> f32 {
+        let (u, v) = (p.x.round(), p.y.round());
+        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
+        if inside { self.coverage[v as usize * self.width + u as usize] } else { 0.0 }
+    }
 }
 
 /// A point of a twine in the picture.
@@ -55,6 +62,8 @@ pub(crate) struct Stroke {
     pub(crate) to: Vertex,
     /// How far the middle lies off the chord, px, to the right of the way from `from` to `to` (v is down); the stroke is a parabola.
     pub(crate) bow_px: f64,
+    /// How much brighter its right side is than its middle, and darker its left: share.
+    pub(crate) shade: f64,
     pub(crate) start: End,
     pub(crate) end: End,
 }
@@ -89,6 +98,18 @@ impl Span {
 }
 
 impl Stroke {
+    /// Direction at the start and at the end, of unit length.
+    pub(crate) fn tangents(&self) -> [Vector2<f64>; 2] {
+        let chord = self.to.pixel - self.from.pixel;
+        let length = chord.norm();
+        if length < 1e-9 {
+            return [Vector2::x(); 2];
+        }
+        // A parabola that leaves its chord by `bow` in the middle starts and ends with a slope of 4 bow / length.
+        let lean = Vector2::new(-chord.y, chord.x) / length * (4.0 * self.bow_px);
+        [(chord + lean).normalize(), (chord - lean).normalize()]
+    }
+
     /// Adds the stroke to its family.
     pub(crate) fn draw(&self, family: &mut Family, edge: &EdgeSpread, sigma: f64) {
         let (p0, p1) = (self.from.pixel, self.to.pixel);
@@ -119,6 +140,7 @@ impl Stroke {
             return;
         }
         let inverse_sigma = 1.0 / sigma;
+        let shade = self.shade as f32;
         let (half0, half1) = (0.5 * self.from.width_px * inverse_sigma, 0.5 * self.to.width_px * inverse_sigma);
         for v in v_low as usize..=v_high as usize {
             let y = v as f64;
@@ -145,15 +167,18 @@ impl Stroke {
                 let s = along.dot(&offset);
                 let t = (s / length).clamp(0.0, 1.0);
                 let d = across.dot(&offset) - self.bow_px * 4.0 * t * (1.0 - t);
-                let mut share = edge.strip((d * inverse_sigma) as f32, (half0 + (half1 - half0) * t) as f32);
-                if matches!(self.start, End::Free) {
-                    share *= edge.below((s * inverse_sigma) as f32);
-                }
-                if matches!(self.end, End::Free) {
-                    share *= edge.below(((length - s) * inverse_sigma) as f32);
+                let (x, half) = ((d * inverse_sigma) as f32, (half0 + (half1 - half0) * t) as f32);
+                let mut share = edge.strip(x, half);
+                let mut lit = if shade == 0.0 { share } else { share + shade * edge.ramp(x, half) };
+                for (end, way) in [(self.start, s), (self.end, length - s)] {
+                    if matches!(end, End::Free) {
+                        let inside = edge.below((way * inverse_sigma) as f32);
+                        share *= inside;
+                        lit *= inside;
+                    }
                 }
                 *c += share;
-                *l += share * (self.from.grey + (self.to.grey - self.from.grey) * t) as f32;
+                *l += lit * (self.from.grey + (self.to.grey - self.from.grey) * t) as f32;
             }
         }
     }
