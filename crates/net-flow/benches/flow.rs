@@ -26,10 +26,10 @@ fn stages(c: &mut Criterion) {
     let (a, b) = (draw(Vector2::zeros()), draw(Vector2::new(2.3, -1.4)));
     let view = |data| GrayView::packed(data, WIDTH, HEIGHT).expect("a view of its own buffer");
     let config = MatchConfig::default();
-    let mut prev = Pyramid::new(WIDTH, HEIGHT, config.levels);
+    let mut prev = Pyramid::new(config.levels);
     let mut next = prev.clone();
-    prev.build(view(&a)).expect("its size");
-    c.bench_function("pyramid", |bench| bench.iter(|| next.build(black_box(view(&b))).expect("its size")));
+    prev.build(view(&a), 24);
+    c.bench_function("pyramid", |bench| bench.iter(|| next.build(black_box(view(&b)), 24)));
     let points: Vec<_> =
         (0..300).map(|i| Vector2::new(35.0 + 40.0 * (i % 20) as f64, 30.0 + 29.0 * (i / 20) as f64)).collect();
     let mut matcher = Matcher::new(&config).expect("defaults");

@@ -5,14 +5,22 @@
 //! and matched back: a point that does not return to where it came from is not believed.
 
 use nalgebra::{Matrix2, Vector2};
-use net_image::GrayView;
+use net_image::{GrayView, Pyramid};
 
 use crate::config::MatchConfig;
 use crate::error::{Error, Result};
 use crate::motion::Motion;
-use crate::pyramid::Pyramid;
 use crate::refine::Refine;
 use crate::zncc::{MAX_RADIUS, Zncc};
+
+/// Shortest side of a pyramid's coarsest level, px: below it a template no longer fits.
+pub(crate) const SMALLEST_SIDE_PX: usize = 24;
+
+/// Half width of the templates that vote for the common shift, px of their level: many points make up for small windows.
+const SURFACE_HALF_PX: usize = 7;
+
+/// Times that a search follows a peak on its border.
+const MAX_WALKS: usize = 3;
 
 /// How a point's match ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +57,8 @@ pub enum Guess<'a> {
     Motion(&'a Motion),
     /// Each point's expected pixel in the next picture.
     Pixels(&'a [Vector2<f64>]),
+    /// Each point's expected pixel; templates are stretched and turned along with the motion.
+    PixelsAlong(&'a [Vector2<f64>], &'a Motion),
 }
 
 /// How far to search.
@@ -60,7 +70,7 @@ pub(crate) struct Reach {
     pub radius: usize,
 }
 
-/// Matches points between two pyramids. Owns its buffers.
+/// Matches points between two pyramids (`net_image::Pyramid`, of [`MatchConfig::levels`] levels). Owns its buffers.
 #[derive(Debug, Clone)]
 pub struct Matcher {
     config: MatchConfig,
@@ -110,7 +120,7 @@ impl Matcher {
         matches: &mut Vec<Match>,
     ) -> Result<()> {
         same_size(prev, next)?;
-        if let Guess::Pixels(pixels) = guess
+        if let Guess::Pixels(pixels) | Guess::PixelsAlong(pixels, _) = guess
             && pixels.len() != points.len()
         {
             return Err(Error::Length { what: "guessed pixels", expected: points.len(), got: pixels.len() });
@@ -121,6 +131,7 @@ impl Matcher {
                 Guess::Still => (point, Matrix2::identity()),
                 Guess::Motion(motion) => (motion.apply(point), motion.jacobian(point)),
                 Guess::Pixels(pixels) => (pixels[i], Matrix2::identity()),
+                Guess::PixelsAlong(pixels, motion) => (pixels[i], motion.jacobian(point)),
             };
             matches.push(self.match_point(prev, next, point, expected, &next_from_prev, reach));
         }
@@ -162,9 +173,9 @@ impl Matcher {
         if self.config.refine_iterations > 0 {
             let half = self.config.half_window(0);
             let iterations = self.config.refine_iterations;
-            if let Some(pixel) = self.refine.align(self.zncc.exact(), half, next.level(0), at, iterations) {
-                at = pixel;
-            }
+            let refined =
+                next.level(0).and_then(|view| self.refine.align(self.zncc.exact(), half, view, at, iterations));
+            at = refined.unwrap_or(at);
         }
         found.pixel = at;
         if !inside(next, at) {
@@ -193,22 +204,76 @@ impl Matcher {
         radius: usize,
     ) -> Option<(Vector2<f64>, f32)> {
         let scale = f64::from(1u32 << level);
-        if !self.zncc.cut(from.level(level), point / scale, from_template, self.config.half_window(level)) {
+        let (from, to) = (from.level(level)?, to.level(level)?);
+        if !self.zncc.cut(from, point / scale, from_template, self.config.half_window(level)) {
             return None;
         }
         let mut centre = (expected / scale).map(f64::round);
         let mut walked = 0;
         loop {
-            self.zncc.search(to.level(level), (centre.x as i64, centre.y as i64), radius.clamp(1, MAX_RADIUS));
+            self.zncc.search(to, (centre.x as i64, centre.y as i64), radius.clamp(1, MAX_RADIUS));
             let peak = self.zncc.peak();
-            // A peak on the border of a fine search: look beyond it, a little.
-            if peak.on_border && level == 0 && walked < 2 {
+            // A peak on the border of the search: look beyond it, a little.
+            if peak.on_border && walked < MAX_WALKS {
                 walked += 1;
                 centre += peak.shift;
                 continue;
             }
             return Some(((centre + peak.shift) * scale, peak.score));
         }
+    }
+
+    /// Scores of all whole-pixel shifts of one point at `level` within `radius` px of the level, for the sum over points; `None` where
+    /// nothing shows.
+    pub(crate) fn surface(
+        &mut self,
+        prev: &Pyramid,
+        next: &Pyramid,
+        point: Vector2<f64>,
+        motion: &Motion,
+        reach: Reach,
+    ) -> Option<&[f32]> {
+        let expected = motion.apply(point);
+        if !(inside(prev, point) && inside(next, expected)) {
+            return None;
+        }
+        let stretch = usable_stretch(&motion.jacobian(point), self.config.half_window_px);
+        let scale = f64::from(1u32 << reach.level);
+        let (from, to) = (prev.level(reach.level)?, next.level(reach.level)?);
+        // A template cut where its partner will be on whole pixels: then all points share one grid of shifts.
+        let centre = (expected / scale).map(f64::round);
+        let inverse = stretch.try_inverse()?;
+        let point = point / scale + inverse * (centre - expected / scale);
+        let half = self.config.half_window_px.min(SURFACE_HALF_PX);
+        if !self.zncc.cut(from, point, &inverse, half) {
+            return None;
+        }
+        self.zncc.search(to, (centre.x as i64, centre.y as i64), reach.radius);
+        Some(self.zncc.scores())
+    }
+
+    /// Score of the best shift within `radius` px of `expected` at full size; `None` outside the picture or where nothing shows.
+    pub(crate) fn score_at(
+        &mut self,
+        prev: &Pyramid,
+        next: &Pyramid,
+        point: Vector2<f64>,
+        expected: Vector2<f64>,
+        next_from_prev: &Matrix2<f64>,
+        radius: usize,
+    ) -> Option<f32> {
+        let stretch = usable_stretch(next_from_prev, self.config.half_window_px);
+        let margin = self.config.half_window_px as f64;
+        if !(inside(prev, point) && well_inside(next, expected, margin)) {
+            return None;
+        }
+        let (prev, next) = (prev.level(0)?, next.level(0)?);
+        if !self.zncc.cut(prev, point, &stretch.try_inverse()?, self.config.half_window(0)) {
+            return None;
+        }
+        let centre = expected.map(f64::round);
+        self.zncc.search(next, (centre.x as i64, centre.y as i64), radius);
+        Some(self.zncc.peak().score)
     }
 }
 
@@ -226,10 +291,9 @@ pub fn match_points(
     config: &MatchConfig,
 ) -> Result<Vec<Match>> {
     let mut matcher = Matcher::new(config)?;
-    let mut from = Pyramid::new(prev.width(), prev.height(), config.levels);
-    let mut to = from.clone();
-    from.build(prev)?;
-    to.build(next)?;
+    let (mut from, mut to) = (Pyramid::new(config.levels), Pyramid::new(config.levels));
+    from.build(prev, SMALLEST_SIDE_PX);
+    to.build(next, SMALLEST_SIDE_PX);
     let mut matches = Vec::with_capacity(points.len());
     matcher.match_points(&from, &to, points, guess, &mut matches)?;
     Ok(matches)
@@ -237,15 +301,16 @@ pub fn match_points(
 
 /// Refuses pyramids that do not belong together.
 pub(crate) fn same_size(a: &Pyramid, b: &Pyramid) -> Result<()> {
-    if (a.width(), a.height(), a.len()) == (b.width(), b.height(), b.len()) {
+    let ((width, height), (expected_width, expected_height)) = (size(b), size(a));
+    if (width, height) == (expected_width, expected_height) && a.len() == b.len() {
         return Ok(());
     }
-    Err(Error::ImageSize {
-        width: b.width(),
-        height: b.height(),
-        expected_width: a.width(),
-        expected_height: a.height(),
-    })
+    Err(Error::ImageSize { width, height, expected_width, expected_height })
+}
+
+/// Width and height of level 0, px; zero while a pyramid holds no picture.
+fn size(pyramid: &Pyramid) -> (usize, usize) {
+    pyramid.level(0).map_or((0, 0), |view| (view.width(), view.height()))
 }
 
 /// Whether a pixel is in the picture; NaN is not.
@@ -255,7 +320,8 @@ pub(crate) fn inside(pyramid: &Pyramid, pixel: Vector2<f64>) -> bool {
 
 /// Whether a pixel is in the picture and at least `margin` px from its edge; NaN is not.
 pub(crate) fn well_inside(pyramid: &Pyramid, pixel: Vector2<f64>, margin: f64) -> bool {
-    let (w, h) = (pyramid.width() as f64 - 1.0 - margin, pyramid.height() as f64 - 1.0 - margin);
+    let (width, height) = size(pyramid);
+    let (w, h) = (width as f64 - 1.0 - margin, height as f64 - 1.0 - margin);
     pixel.x >= margin && pixel.y >= margin && pixel.x <= w && pixel.y <= h
 }
 

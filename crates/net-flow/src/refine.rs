@@ -5,9 +5,9 @@
 //! eliminated starts from there and has no such pull.
 
 use nalgebra::{Matrix2, Vector2};
-use net_image::Image;
+use net_image::GrayView;
 
-use crate::zncc::sample_patch;
+use crate::zncc::{sample_patch, sum_of};
 
 /// Farther than this from the start it has run away, px: the quadratic is never that wrong.
 const MAX_WALK_PX: f64 = 0.75;
@@ -19,8 +19,9 @@ const SMALL_STEP_PX: f64 = 0.002;
 pub(crate) struct Refine {
     /// Patch of the next picture.
     patch: Vec<f32>,
-    /// Gradient of the template, zero mean, zero on its rim.
-    gradient: Vec<[f32; 2]>,
+    /// Gradient of the template along u and v, zero mean, zero on its rim.
+    gradient_u: Vec<f32>,
+    gradient_v: Vec<f32>,
 }
 
 impl Refine {
@@ -29,7 +30,7 @@ impl Refine {
         &mut self,
         template: &[f32],
         half: usize,
-        image: &Image<u8>,
+        image: GrayView<'_>,
         start: Vector2<f64>,
         iterations: usize,
     ) -> Option<Vector2<f64>> {
@@ -38,35 +39,24 @@ impl Refine {
             return None;
         }
         self.set_gradient(template, side);
-        let (mut uu, mut uv, mut vv) = (0.0f32, 0.0f32, 0.0f32);
-        for [gu, gv] in &self.gradient {
-            uu += gu * gu;
-            uv += gu * gv;
-            vv += gv * gv;
-        }
+        let (gu, gv) = (&self.gradient_u, &self.gradient_v);
+        let (uu, uv, vv) = (dot(gu, gu), dot(gu, gv), dot(gv, gv));
         let inverse = Matrix2::new(uu, uv, uv, vv).map(f64::from).try_inverse()?;
+        let (ut, vt) = (dot(gu, template), dot(gv, template));
         let mut at = start;
         for _ in 0..iterations {
             self.patch.clear();
             sample_patch(image, at, &Matrix2::identity(), half, &mut self.patch);
             let n = self.patch.len() as f32;
-            let mean = self.patch.iter().sum::<f32>() / n;
-            let (mut tw, mut ww, mut gt, mut gw) = (0.0f32, 0.0f32, [0.0f32; 2], [0.0f32; 2]);
-            for ((&w, &t), g) in self.patch.iter().zip(template).zip(&self.gradient) {
-                let w = w - mean;
-                tw += t * w;
-                ww += w * w;
-                gt[0] += g[0] * t;
-                gt[1] += g[1] * t;
-                gw[0] += g[0] * w;
-                gw[1] += g[1] * w;
-            }
+            let mean = sum_of(&self.patch) / n;
+            self.patch.iter_mut().for_each(|w| *w -= mean);
+            let (tw, ww) = (dot(template, &self.patch), dot(&self.patch, &self.patch));
             if ww <= n * 0.25 || tw <= 0.0 {
                 return None;
             }
             let gain = tw / ww;
-            let right = Vector2::new(f64::from(gain * gw[0] - gt[0]), f64::from(gain * gw[1] - gt[1]));
-            let step = inverse * right;
+            let (uw, vw) = (dot(gu, &self.patch), dot(gv, &self.patch));
+            let step = inverse * Vector2::new(f64::from(gain * uw - ut), f64::from(gain * vw - vt));
             at -= step;
             let walk = (at - start).norm();
             if walk.is_nan() || walk > MAX_WALK_PX {
@@ -79,24 +69,37 @@ impl Refine {
         Some(at)
     }
 
-    /// Central differences, mean taken away over the inside so that an offset of the light moves nothing.
+    /// Central differences, zero on the rim, mean taken away inside so that an offset of the light moves nothing.
     fn set_gradient(&mut self, template: &[f32], side: usize) {
-        self.gradient.clear();
-        self.gradient.resize(side * side, [0.0; 2]);
-        let mut mean = [0.0f32; 2];
-        for v in 1..side - 1 {
-            for u in 1..side - 1 {
-                let i = v * side + u;
-                let g = [0.5 * (template[i + 1] - template[i - 1]), 0.5 * (template[i + side] - template[i - side])];
-                mean = [mean[0] + g[0], mean[1] + g[1]];
-                self.gradient[i] = g;
+        for (gradient, step) in [(&mut self.gradient_u, 1), (&mut self.gradient_v, side)] {
+            gradient.clear();
+            gradient.resize(side * side, 0.0);
+            let mut total = 0.0;
+            for v in 1..side - 1 {
+                let inner = v * side + 1..(v + 1) * side - 1;
+                let after = &template[inner.start + step..inner.end + step];
+                let before = &template[inner.start - step..inner.end - step];
+                for ((g, a), b) in gradient[inner.clone()].iter_mut().zip(after).zip(before) {
+                    *g = 0.5 * (a - b);
+                }
+                total += sum_of(&gradient[inner]);
             }
-        }
-        let inner = ((side - 2) * (side - 2)) as f32;
-        for v in 1..side - 1 {
-            for g in &mut self.gradient[v * side + 1..(v + 1) * side - 1] {
-                *g = [g[0] - mean[0] / inner, g[1] - mean[1] / inner];
+            let mean = total / ((side - 2) * (side - 2)) as f32;
+            for v in 1..side - 1 {
+                gradient[v * side + 1..(v + 1) * side - 1].iter_mut().for_each(|g| *g -= mean);
             }
         }
     }
+}
+
+/// Sum of products in eight lanes.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut lanes = [0.0f32; 8];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..8 {
+            lanes[k] += a[k] * b[k];
+        }
+    }
+    lanes.iter().sum::<f32>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f32>()
 }

@@ -5,7 +5,7 @@
 //! instruction, the same on every machine); means and variances of the window come from running sums.
 
 use nalgebra::{Matrix2, Vector2};
-use net_image::Image;
+use net_image::GrayView;
 use wide::{i16x8, i32x4};
 
 /// Largest half width of a template, px.
@@ -16,6 +16,8 @@ pub(crate) const MAX_RADIUS: usize = 24;
 const LANES: usize = 8;
 /// Steps of the template per grey level. 255 * 16 * 255 * 63 * 63 is within `i64`; a row of it within `i32`.
 const STEPS: f32 = 16.0;
+/// Rounds a small f32 to a whole number when added.
+const ROUNDER: f32 = 12_582_912.0;
 /// A template of less variance, grey levels squared, shows nothing.
 const FLAT_VARIANCE: f64 = 0.5;
 
@@ -36,8 +38,10 @@ pub(crate) struct Zncc {
     energy: f64,
     /// Window rows of `stride` values.
     window: Vec<i16>,
-    /// Column sums of the window, and of its squares.
-    columns: Vec<(i32, i32)>,
+    /// Column sums of the window over the template's rows.
+    sums: Vec<i32>,
+    /// Column sums of its squares.
+    squares: Vec<i32>,
     /// Scores, rows of `2 radius + 1`.
     scores: Vec<f32>,
     /// Search radius of `scores`, px.
@@ -67,7 +71,8 @@ impl Zncc {
             sum: 0,
             energy: 0.0,
             window: Vec::with_capacity(window * window),
-            columns: Vec::with_capacity(window),
+            sums: Vec::with_capacity(window),
+            squares: Vec::with_capacity(window),
             scores: Vec::with_capacity((2 * MAX_RADIUS + 1).pow(2)),
             radius: 0,
         }
@@ -77,7 +82,7 @@ impl Zncc {
     /// identity: as it is). False when there is nothing to see in it.
     pub(crate) fn cut(
         &mut self,
-        image: &Image<u8>,
+        image: GrayView<'_>,
         centre: Vector2<f64>,
         source_from_template: &Matrix2<f64>,
         half: usize,
@@ -87,22 +92,29 @@ impl Zncc {
         self.half = half;
         self.exact.clear();
         sample_patch(image, centre, source_from_template, half, &mut self.exact);
-        let mean = self.exact.iter().sum::<f32>() / (side * side) as f32;
+        let mean = sum_of(&self.exact) / (side * side) as f32;
         self.exact.iter_mut().for_each(|x| *x -= mean);
         self.row_lanes = side.div_ceil(LANES);
         self.template.clear();
-        let (mut sum, mut squares) = (0i64, 0i64);
+        let (mut sum, mut squares) = (i32x4::ZERO, 0i64);
+        let ones = i16x8::splat(1);
         for row in self.exact.chunks_exact(side) {
+            let mut row_squares = i32x4::ZERO;
             for chunk in row.chunks(LANES) {
                 let mut lanes = [0i16; LANES];
                 for (lane, &x) in lanes.iter_mut().zip(chunk) {
-                    *lane = (x * STEPS).round_ties_even() as i16;
-                    sum += i64::from(*lane);
-                    squares += i64::from(*lane) * i64::from(*lane);
+                    // |x| <= 255: adding 1.5 * 2^23 leaves the rounded number in the low bits of the sum.
+                    *lane = (x * STEPS + ROUNDER).to_bits() as i16;
                 }
-                self.template.push(i16x8::from(lanes));
+                let lanes = i16x8::from(lanes);
+                sum += lanes.dot(ones);
+                row_squares += lanes.dot(lanes);
+                self.template.push(lanes);
             }
+            // Eight products of at most 2 * 4080^2 = 3.3e7 a lane and row.
+            squares += i64::from(row_squares.reduce_add());
         }
+        let sum = i64::from(sum.reduce_add());
         let n = (side * side) as f64;
         self.sum = sum;
         self.energy = squares as f64 - (sum as f64).powi(2) / n;
@@ -115,7 +127,7 @@ impl Zncc {
     }
 
     /// Scores all shifts up to `radius` round the whole pixel `centre` of `image`; edges repeated.
-    pub(crate) fn search(&mut self, image: &Image<u8>, centre: (i64, i64), radius: usize) {
+    pub(crate) fn search(&mut self, image: GrayView<'_>, centre: (i64, i64), radius: usize) {
         let radius = radius.min(MAX_RADIUS);
         let side = 2 * self.half + 1;
         let reach = (self.half + radius) as i64;
@@ -124,28 +136,27 @@ impl Zncc {
         let stride = 2 * radius + self.row_lanes * LANES;
         self.radius = radius;
         self.load_window(image, (centre.0 - reach, centre.1 - reach), rows, stride);
-        self.columns.clear();
-        self.columns.resize(rows, (0, 0));
+        self.sums.clear();
+        self.sums.resize(rows, 0);
+        self.squares.clear();
+        self.squares.resize(rows, 0);
         let n = (side * side) as f64;
         for v in 0..side {
-            add_row(&mut self.columns, &self.window[v * stride..], 1);
+            self.add_row(v * stride, 0);
         }
         self.scores.clear();
         for dv in 0..=2 * radius {
             if dv > 0 {
-                add_row(&mut self.columns, &self.window[(dv - 1) * stride..], -1);
-                add_row(&mut self.columns, &self.window[(dv + side - 1) * stride..], 1);
+                self.add_row((dv - 1) * stride, -1);
+                self.add_row((dv + side - 1) * stride, 0);
             }
-            let (mut sum, mut squares) = (0i64, 0i64);
-            for &(s, q) in &self.columns[..side] {
-                sum += i64::from(s);
-                squares += i64::from(q);
-            }
+            let mut sum: i32 = self.sums[..side].iter().sum();
+            // At most 63 * 63 * 255^2 = 2.6e8.
+            let mut squares: i32 = self.squares[..side].iter().sum();
             for du in 0..=2 * radius {
                 if du > 0 {
-                    let (out, new) = (self.columns[du - 1], self.columns[du + side - 1]);
-                    sum += i64::from(new.0 - out.0);
-                    squares += i64::from(new.1 - out.1);
+                    sum += self.sums[du + side - 1] - self.sums[du - 1];
+                    squares += self.squares[du + side - 1] - self.squares[du - 1];
                 }
                 let product = match self.row_lanes {
                     1 => correlate::<1>(&self.template, &self.window[dv * stride + du..], stride),
@@ -157,8 +168,9 @@ impl Zncc {
                     7 => correlate::<7>(&self.template, &self.window[dv * stride + du..], stride),
                     _ => correlate::<8>(&self.template, &self.window[dv * stride + du..], stride),
                 };
-                let variance = squares as f64 - (sum as f64).powi(2) / n;
-                let covariance = product as f64 - self.sum as f64 * sum as f64 / n;
+                let (sum, squares) = (f64::from(sum), f64::from(squares));
+                let variance = squares - sum * sum / n;
+                let covariance = product as f64 - self.sum as f64 * sum / n;
                 let scale = (self.energy * variance).sqrt();
                 // A flat window resembles nothing.
                 let flat = variance <= FLAT_VARIANCE * n || scale <= 0.0;
@@ -168,7 +180,6 @@ impl Zncc {
     }
 
     /// Scores of the last search, rows of `2 radius + 1`.
-    #[cfg(test)]
     pub(crate) fn scores(&self) -> &[f32] {
         &self.scores
     }
@@ -192,8 +203,19 @@ impl Zncc {
         Peak { shift: whole + offset, score: (best + gain).min(1.0), on_border: false }
     }
 
+    /// Adds (`sign` 0) or takes away (`sign` -1) the window's row that starts at `start` to the column sums.
+    fn add_row(&mut self, start: usize, sign: i32) {
+        let row = &self.window[start..][..self.sums.len()];
+        for ((s, q), &x) in self.sums.iter_mut().zip(&mut self.squares).zip(row) {
+            // 255^2 fits 16 bits, and 16-bit products are what every machine has in vector form.
+            let square = (x as u16).wrapping_mul(x as u16);
+            *s += (i32::from(x) ^ sign) - sign;
+            *q += (i32::from(square) ^ sign) - sign;
+        }
+    }
+
     /// Copies rows of the picture, edges repeated, zeros in the padding.
-    fn load_window(&mut self, image: &Image<u8>, corner: (i64, i64), rows: usize, stride: usize) {
+    fn load_window(&mut self, image: GrayView<'_>, corner: (i64, i64), rows: usize, stride: usize) {
         let (width, height) = (image.width() as i64, image.height() as i64);
         self.window.clear();
         for v in 0..rows as i64 {
@@ -210,13 +232,14 @@ impl Zncc {
     }
 }
 
-/// Adds (or takes away) one row to the column sums.
-fn add_row(columns: &mut [(i32, i32)], row: &[i16], sign: i32) {
-    for ((s, q), &x) in columns.iter_mut().zip(row) {
-        let x = i32::from(x);
-        *s += sign * x;
-        *q += sign * x * x;
+/// Sum in eight lanes.
+pub(crate) fn sum_of(values: &[f32]) -> f32 {
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut lanes = [0.0f32; LANES];
+    for chunk in chunks {
+        lanes.iter_mut().zip(chunk).for_each(|(lane, x)| *lane += x);
     }
+    lanes.iter().sum::<f32>() + rest.iter().sum::<f32>()
 }
 
 /// Sum of products of a template of `N` lanes a row with the window that starts at `window[0]`.
@@ -266,7 +289,7 @@ pub(crate) fn quadratic_peak(at: impl Fn(isize, isize) -> f32) -> (Vector2<f64>,
 
 /// Samples `(2 half + 1)^2` values round `centre`, bilinear, edges repeated, stretched by `source_from_patch`.
 pub(crate) fn sample_patch(
-    image: &Image<u8>,
+    image: GrayView<'_>,
     centre: Vector2<f64>,
     source_from_patch: &Matrix2<f64>,
     half: usize,
@@ -280,13 +303,15 @@ pub(crate) fn sample_patch(
         let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
         let (a, b, c, d) = ((1.0 - fu) * (1.0 - fv), fu * (1.0 - fv), (1.0 - fu) * fv, fu * fv);
         let (start, side) = ((u0 - reach) as usize, 2 * half + 1);
-        for v in v0 - reach..=v0 + reach {
+        out.resize(side * side, 0.0);
+        for (v, row) in (v0 - reach..).zip(out.chunks_exact_mut(side)) {
             let top = &image.row(v as usize)[start..][..side + 1];
             let bottom = &image.row(v as usize + 1)[start..][..side + 1];
-            out.extend((0..side).map(|u| {
-                let x = |r: &[u8], u: usize| f32::from(r[u]);
-                a * x(top, u) + b * x(top, u + 1) + c * x(bottom, u) + d * x(bottom, u + 1)
-            }));
+            let left = top[..side].iter().zip(&bottom[..side]);
+            let right = top[1..].iter().zip(&bottom[1..]);
+            for ((out, (&tl, &bl)), (&tr, &br)) in row.iter_mut().zip(left).zip(right) {
+                *out = a * f32::from(tl) + b * f32::from(tr) + c * f32::from(bl) + d * f32::from(br);
+            }
         }
         return;
     }
@@ -302,7 +327,7 @@ pub(crate) fn sample_patch(
 
 /// One bilinear sample, edges repeated. NaN samples the corner: callers have checked their points.
 #[inline]
-fn bilinear(image: &Image<u8>, u: f32, v: f32) -> f32 {
+fn bilinear(image: GrayView<'_>, u: f32, v: f32) -> f32 {
     let u = u.clamp(0.0, (image.width() - 1) as f32);
     let v = v.clamp(0.0, (image.height() - 1) as f32);
     let (u0, v0) = (u as usize, v as usize);
@@ -315,6 +340,8 @@ fn bilinear(image: &Image<u8>, u: f32, v: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use net_image::Image;
+
     use super::*;
 
     fn picture(width: usize, height: usize) -> Image<u8> {
@@ -326,7 +353,7 @@ mod tests {
     }
 
     /// The definition, in f64.
-    fn naive(template: &[f32], image: &Image<u8>, centre: (i64, i64), half: i64) -> f64 {
+    fn naive(template: &[f32], image: GrayView<'_>, centre: (i64, i64), half: i64) -> f64 {
         let at = |u: i64, v: i64| {
             let u = (centre.0 + u).clamp(0, image.width() as i64 - 1) as usize;
             f64::from(image.row((centre.1 + v).clamp(0, image.height() as i64 - 1) as usize)[u])
@@ -350,18 +377,19 @@ mod tests {
 
     #[test]
     fn scores_equal_the_definition() {
-        let image = picture(90, 70);
+        let picture = picture(90, 70);
+        let image = picture.view().expect("pixels");
         let mut zncc = Zncc::new();
         // Templates of every number of lanes, in the middle and over the edge of the picture.
         for (half, centre) in
             [(1, (40, 30)), (4, (2, 3)), (7, (45, 33)), (10, (80, 60)), (15, (44, 35)), (31, (44, 35))]
         {
-            assert!(zncc.cut(&image, Vector2::new(41.3, 32.7), &Matrix2::identity(), half));
+            assert!(zncc.cut(image, Vector2::new(41.3, 32.7), &Matrix2::identity(), half));
             let template = zncc.exact().to_vec();
-            zncc.search(&image, centre, 3);
+            zncc.search(image, centre, 3);
             for (i, &score) in zncc.scores().iter().enumerate() {
                 let shifted = (centre.0 + i as i64 % 7 - 3, centre.1 + i as i64 / 7 - 3);
-                let expected = naive(&template, &image, shifted, half as i64);
+                let expected = naive(&template, image, shifted, half as i64);
                 // The template is rounded to a sixteenth of a grey level, the contrast here is some tens of them.
                 assert!((f64::from(score) - expected).abs() < 2e-3, "{half} {i}: {score} {expected}");
             }
@@ -372,12 +400,13 @@ mod tests {
     fn no_overflow_at_full_contrast() {
         let data = (0..128 * 128).map(|i| if (i / 7 + i / (128 * 5)) % 2 == 0 { 255 } else { 0 }).collect();
         let image = Image::from_vec(data, 128, 128).expect("right length");
+        let image = image.view().expect("pixels");
         let mut zncc = Zncc::new();
-        assert!(zncc.cut(&image, Vector2::new(64.0, 64.0), &Matrix2::identity(), MAX_HALF));
+        assert!(zncc.cut(image, Vector2::new(64.0, 64.0), &Matrix2::identity(), MAX_HALF));
         let template = zncc.exact().to_vec();
-        zncc.search(&image, (64, 64), 1);
+        zncc.search(image, (64, 64), 1);
         for (i, &score) in zncc.scores().iter().enumerate() {
-            let expected = naive(&template, &image, (63 + i as i64 % 3, 63 + i as i64 / 3), MAX_HALF as i64);
+            let expected = naive(&template, image, (63 + i as i64 % 3, 63 + i as i64 / 3), MAX_HALF as i64);
             // Rounding as above, on a contrast of 255 levels.
             assert!((f64::from(score) - expected).abs() < 1e-4, "{i}: {score} {expected}");
         }
@@ -386,10 +415,12 @@ mod tests {
     #[test]
     fn flat_templates_and_windows_match_nothing() {
         let flat = Image::from_vec(vec![77u8; 64 * 64], 64, 64).expect("right length");
+        let flat = flat.view().expect("pixels");
+        let seen = picture(64, 64);
         let mut zncc = Zncc::new();
-        assert!(!zncc.cut(&flat, Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
-        assert!(zncc.cut(&picture(64, 64), Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
-        zncc.search(&flat, (30, 30), 2);
+        assert!(!zncc.cut(flat, Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
+        assert!(zncc.cut(seen.view().expect("pixels"), Vector2::new(30.0, 30.0), &Matrix2::identity(), 7));
+        zncc.search(flat, (30, 30), 2);
         assert!(zncc.scores().iter().all(|&s| s == 0.0));
     }
 

@@ -17,7 +17,15 @@ pub struct Camera {
     lens: Lens,
     /// Radius on the plane `z = 1` out to which the lens model is one-to-one.
     valid_radius: f64,
+    /// See [`Camera::view_box`].
+    view_box: [f64; 4],
 }
+
+/// Rays looked at along each side of the image to find the bounds of its view.
+const VIEW_BOX_STEPS: u32 = 32;
+
+/// Widening of these bounds, as a share of the view, for the bulge of a bent border between two such rays.
+const VIEW_BOX_MARGIN: f64 = 0.01;
 
 impl Camera {
     /// Focal lengths `fx, fy` and principal point `cx, cy` in pixels, image size in pixels.
@@ -34,7 +42,9 @@ impl Camera {
         for &k in lens.coefficients() {
             finite("distortion coefficient", k)?;
         }
-        Ok(Self { fx, fy, cx, cy, width, height, lens, valid_radius: lens.valid_radius() })
+        let camera =
+            Self { fx, fy, cx, cy, width, height, lens, valid_radius: lens.valid_radius(), view_box: [0.0; 4] };
+        Ok(camera.with_view_box())
     }
 
     /// Focal length along u, px.
@@ -84,7 +94,7 @@ impl Camera {
 
     /// The same camera without its lens.
     pub fn pinhole(&self) -> Self {
-        Self { lens: Lens::None, valid_radius: f64::INFINITY, ..*self }
+        Self { lens: Lens::None, valid_radius: f64::INFINITY, ..*self }.with_view_box()
     }
 
     /// The camera of the part of the picture of `width` x `height` px whose top-left pixel is `(u, v)`.
@@ -94,7 +104,49 @@ impl Camera {
     pub fn cropped(&self, u: u32, v: u32, width: u32, height: u32) -> Result<Self> {
         positive("image width", f64::from(width))?;
         positive("image height", f64::from(height))?;
-        Ok(Self { cx: self.cx - f64::from(u), cy: self.cy - f64::from(v), width, height, ..*self })
+        let part = Self { cx: self.cx - f64::from(u), cy: self.cy - f64::from(v), width, height, ..*self };
+        Ok(part.with_view_box())
+    }
+
+    /// Whether `pixel` lies on the image: at most half a pixel from the centre of an outermost one.
+    #[inline]
+    pub fn contains(&self, pixel: Vector2<f64>) -> bool {
+        let inside = |x: f64, size: u32| x >= -0.5 && x < f64::from(size) - 0.5;
+        inside(pixel.x, self.width) && inside(pixel.y, self.height)
+    }
+
+    /// Bounds of `x` and of `y`, least and greatest, of all rays `(x, y, 1)` that the image sees.
+    pub fn view_box(&self) -> [f64; 4] {
+        self.view_box
+    }
+
+    /// Works out `view_box` from rays along the border.
+    fn with_view_box(self) -> Self {
+        let (right, bottom) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
+        let mut bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+        let mut seen = true;
+        for k in 0..=VIEW_BOX_STEPS {
+            let share = f64::from(k) / f64::from(VIEW_BOX_STEPS);
+            let (u, v) = (-0.5 + (right + 0.5) * share, -0.5 + (bottom + 0.5) * share);
+            for (u, v) in [(u, -0.5), (u, bottom), (-0.5, v), (right, v)] {
+                let Some(ray) = self.ray_from_pixel(Vector2::new(u, v)) else {
+                    seen = false;
+                    continue;
+                };
+                bounds = [bounds[0].min(ray.x), bounds[1].max(ray.x), bounds[2].min(ray.y), bounds[3].max(ray.y)];
+            }
+        }
+        let view_box = if !seen {
+            // The lens model ends inside the image.
+            [-self.valid_radius, self.valid_radius, -self.valid_radius, self.valid_radius]
+        } else if matches!(self.lens, Lens::None) {
+            bounds
+        } else {
+            // A bent border bulges between the rays looked at.
+            let margin = VIEW_BOX_MARGIN * (bounds[1] - bounds[0]).max(bounds[3] - bounds[2]);
+            [bounds[0] - margin, bounds[1] + margin, bounds[2] - margin, bounds[3] + margin]
+        };
+        Self { view_box, ..self }
     }
 
     /// Ray `(x, y, 1)` in the camera frame through pixel `(u, v)`. `None` where the lens model has no inverse, or more than 89.9 degrees off

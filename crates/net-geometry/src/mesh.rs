@@ -81,6 +81,51 @@ impl Mesh {
     pub fn node(&self, i: f64, j: f64) -> Vector2<f64> {
         self.a1() * i + self.a2() * j
     }
+
+    /// Lattice coordinates of a point of the net plane, m: whole numbers at the nodes.
+    #[inline]
+    pub fn coordinates(&self, point: Vector2<f64>) -> Vector2<f64> {
+        let a2 = self.a2();
+        let j = point.y / a2.y;
+        Vector2::new((point.x - j * a2.x) / self.side1, j)
+    }
+
+    /// Indices of the node nearest to a point of the net plane, m: also for oblique meshes, where rounding the coordinates need not give it.
+    /// `None` for a point that is not finite, or more than 2^30 cells away.
+    pub fn nearest_node(&self, point: Vector2<f64>) -> Option<(i32, i32)> {
+        // In a basis of shortest vectors (Lagrange) the nearest node is a corner of the point's cell. Each with its own indices.
+        let mut short = (self.a1(), Vector2::new(1.0, 0.0));
+        let mut long = (self.a2(), Vector2::new(0.0, 1.0));
+        loop {
+            if short.0.norm_squared() > long.0.norm_squared() {
+                std::mem::swap(&mut short, &mut long);
+            }
+            let overlap = short.0.dot(&long.0) / short.0.norm_squared();
+            // A little more than a half, or at exactly 60 degrees it would go to and fro. Each round shortens the longer vector, so this ends;
+            // meshes that are not slivers need one round at most.
+            if !(overlap.abs() > 0.5 + 1e-9 && overlap.is_finite()) {
+                break;
+            }
+            long = (long.0 - short.0 * overlap.round(), long.1 - short.1 * overlap.round());
+        }
+        let area = short.0.perp(&long.0);
+        let corner = Vector2::new(point.perp(&long.0) / area, short.0.perp(&point) / area).map(f64::floor);
+        let mut nearest = (f64::INFINITY, Vector2::repeat(f64::NAN));
+        for step in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let at = corner + Vector2::new(step.0, step.1);
+            let distance = (short.0 * at.x + long.0 * at.y - point).norm_squared();
+            if distance < nearest.0 {
+                nearest = (distance, short.1 * at.x + long.1 * at.y);
+            }
+        }
+        let far = f64::from(1 << 30);
+        (nearest.1.amax() < far).then_some((nearest.1.x as i32, nearest.1.y as i32))
+    }
+
+    /// The same lattice with its second vector for the first, and the opposite of its first for the second.
+    pub fn turned(&self) -> Self {
+        Self { side1: self.side2, side2: self.side1, angle: std::f64::consts::PI - self.angle }
+    }
 }
 
 /// What a mesh may be written as.

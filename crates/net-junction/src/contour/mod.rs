@@ -1,0 +1,22 @@
+//! Junctions from the outlines of the net's meshes (thesis, 4.4).
+
+mod cluster;
+mod config;
+mod covering;
+mod detector;
+mod expectation;
+mod naming;
+mod quadrilateral;
+mod rectangle;
+mod shape;
+mod size;
+mod threshold;
+mod trace;
+
+pub use config::{Config, LocalMean, Polarity, Shape};
+pub use covering::Covering;
+pub use detector::JunctionDetector;
+pub use expectation::{CellArea, Expectation, ExpectedNet};
+pub use rectangle::{Rectangle, convex_hull, min_area_parallelogram, min_area_rectangle};
+pub use shape::{CellBox, Verdict};
+pub use trace::polygon_area;

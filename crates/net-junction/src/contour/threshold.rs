@@ -1,0 +1,433 @@
+//! Blur and adaptive threshold: which pixels are twine.
+
+use net_geometry::nalgebra::Vector2;
+use net_image::{GrayView, Image};
+
+use crate::contour::config::{Config, LocalMean};
+
+/// Side of the squares over which block size and threshold offset are constant or interpolated, px.
+const TILE: usize = 16;
+/// Fixed-point scale of grey levels inside this stage: the 3 x 3 binomial kernel is then exact.
+const SCALE: f64 = 16.0;
+/// Largest block, px: its sum still fits 32 bits, 4080 * 1001² < 2³².
+const BLOCK_MAX: f64 = 1001.0;
+/// Level of the frame that closes the picture: twine for sure.
+const FRAME: i16 = i16::MAX;
+
+/// Signed distance of each pixel from the threshold, in sixteenths of a grey level: twine where not negative. One pixel of frame, which
+/// counts as twine, lies all round, so that followers of borders need no look at the picture's end.
+#[derive(Debug, Default)]
+pub(crate) struct Level {
+    values: Vec<i16>,
+    width: usize,
+    height: usize,
+}
+
+impl Level {
+    fn resize(&mut self, width: usize, height: usize) {
+        self.width = width;
+        self.height = height;
+        self.values.clear();
+        self.values.resize((width + 2) * (height + 2), FRAME);
+    }
+
+    /// Values from one row to the next.
+    pub fn stride(&self) -> usize {
+        self.width + 2
+    }
+    /// All values with the frame.
+    pub fn values(&self) -> &[i16] {
+        &self.values
+    }
+    /// Width of the picture without the frame, px.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+    /// Height of the picture without the frame, px.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+    /// Row `v` of the picture without the frame.
+    pub fn row(&self, v: usize) -> &[i16] {
+        &self.values[(v + 1) * self.stride() + 1..][..self.width]
+    }
+    fn row_mut(&mut self, v: usize) -> &mut [i16] {
+        let start = (v + 1) * self.stride() + 1;
+        &mut self.values[start..][..self.width]
+    }
+
+    /// For tests of the stages after this one.
+    #[cfg(test)]
+    pub fn from_fn(width: usize, height: usize, f: impl Fn(usize, usize) -> i16) -> Self {
+        let mut level = Self::default();
+        level.resize(width, height);
+        for v in 0..height {
+            for (u, value) in level.row_mut(v).iter_mut().enumerate() {
+                *value = f(u, v);
+            }
+        }
+        level
+    }
+}
+
+/// Buffers of the threshold stage.
+#[derive(Debug, Default)]
+pub(crate) struct Threshold {
+    blurred: Image<u16>,
+    scratch: Image<u16>,
+    /// Sums over all pixels above and left, one row and column of zeros first; they wrap, and differences are right all the same.
+    sums: Vec<u32>,
+    /// Local mean.
+    mean: Image<u16>,
+    /// Pixel less local mean.
+    deviation: Image<i16>,
+    /// Half block per tile, px.
+    half_blocks: Vec<u16>,
+    /// Mean absolute deviation per tile, then the same averaged over a block.
+    spread: Vec<f32>,
+    offsets: Vec<f32>,
+    tiles_wide: usize,
+    tiles_high: usize,
+    level: Level,
+}
+
+impl Threshold {
+    /// Blurs the image and takes the local mean away. `cell_side` tells the side, px, of the cell expected at a pixel, if any.
+    pub fn prepare(&mut self, image: GrayView, config: &Config, cell_side: impl Fn(Vector2<f64>) -> Option<f64>) {
+        let (width, height) = (image.width(), image.height());
+        self.tiles_wide = width.div_ceil(TILE);
+        self.tiles_high = height.div_ceil(TILE);
+        self.plan_blocks(width, height, config, &cell_side);
+        let side = self.small_side(config);
+        self.blur(image, (config.blur_cells * side).max(config.blur_min_px));
+        self.mean.resize(width, height);
+        let boxes = if config.mean == LocalMean::Box { 1 } else { 3 };
+        for pass in 0..boxes {
+            let source = if pass == 0 { &self.blurred } else { &self.mean };
+            sum_up(source, &mut self.sums);
+            self.box_mean();
+        }
+        self.deviation.resize(width, height);
+        let pixels = self.blurred.data().iter().zip(self.mean.data());
+        for (d, (&b, &m)) in self.deviation.data_mut().iter_mut().zip(pixels) {
+            // Both at most 255 * 16.
+            *d = b as i16 - m as i16;
+        }
+        self.measure_spread(config);
+    }
+
+    /// Signed distance from the threshold for light (`true`) or dark twine.
+    pub fn level(&mut self, light: bool) -> &Level {
+        let (width, height) = (self.deviation.width(), self.deviation.height());
+        self.level.resize(width, height);
+        let (wide, high) = (self.tiles_wide, self.tiles_high);
+        for v in 0..height {
+            let (row0, row1, b) = between_tiles(v, high);
+            let (above, below) = (&self.offsets[row0 * wide..][..wide], &self.offsets[row1 * wide..][..wide]);
+            let at = |tile: usize| above[tile] + b * (below[tile] - above[tile]);
+            let source = self.deviation.row(v);
+            let target = self.level.row_mut(v);
+            // Runs of half a tile between which the offset is linear.
+            let mut u = 0;
+            while u < width {
+                let (col0, col1, a) = between_tiles(u, wide);
+                let end = (((u + TILE / 2) / TILE) * TILE + TILE / 2).min(width);
+                let (mut offset, step) = (at(col0) + a * (at(col1) - at(col0)), (at(col1) - at(col0)) / TILE as f32);
+                for (t, &d) in target[u..end].iter_mut().zip(&source[u..end]) {
+                    let o = offset as i16;
+                    *t = if light { d - o } else { -d - o };
+                    offset += step;
+                }
+                u = end;
+            }
+        }
+        &self.level
+    }
+
+    fn plan_blocks(
+        &mut self,
+        width: usize,
+        height: usize,
+        config: &Config,
+        cell_side: &impl Fn(Vector2<f64>) -> Option<f64>,
+    ) {
+        self.half_blocks.clear();
+        for row in 0..self.tiles_high {
+            for col in 0..self.tiles_wide {
+                let middle = |tile: usize, size: usize| ((tile * TILE + TILE / 2).min(size - 1)) as f64;
+                let block = match config.block_px {
+                    Some(block) => block as f64,
+                    // Where no net can be, any block does: nothing is accepted there.
+                    None => cell_side(Vector2::new(middle(col, width), middle(row, height)))
+                        .map_or(3.0, |side| side * config.block_cells),
+                };
+                let block = match config.mean {
+                    LocalMean::Box => block,
+                    // Three boxes of width w have the variance (w² - 1) / 4.
+                    LocalMean::Gaussian => (4.0 * gaussian_sigma(block).powi(2) + 1.0).sqrt(),
+                };
+                self.half_blocks.push(((block.clamp(3.0, BLOCK_MAX) - 1.0) * 0.5).round() as u16);
+            }
+        }
+    }
+
+    /// Side of the smaller cells, px, from the planned blocks: nine tenths of the picture have larger ones. One blur serves all, and
+    /// small meshes suffer from it most.
+    fn small_side(&mut self, config: &Config) -> f64 {
+        self.offsets.clear();
+        self.offsets.extend(self.half_blocks.iter().map(|&half| f32::from(half)));
+        let tenth = self.offsets.len() / 10;
+        let (_, half, _) = self.offsets.select_nth_unstable_by(tenth, f32::total_cmp);
+        let block = 2.0 * f64::from(*half) + 1.0;
+        match config.mean {
+            LocalMean::Box => block / config.block_cells,
+            LocalMean::Gaussian => 3.0 * block / config.block_cells,
+        }
+    }
+
+    /// Binomial blur of the variance nearest to `sigma²`: each pass of 1-2-1 adds a half.
+    fn blur(&mut self, image: GrayView, sigma: f64) {
+        let (width, height) = (image.width(), image.height());
+        self.blurred.resize(width, height);
+        self.scratch.resize(width, height);
+        let passes = (2.0 * sigma * sigma).round().clamp(0.0, 24.0) as usize;
+        for (v, row) in image.rows().enumerate() {
+            for (b, &p) in self.blurred.row_mut(v).iter_mut().zip(row) {
+                *b = u16::from(p) * SCALE as u16;
+            }
+        }
+        for _ in 0..passes {
+            for v in 0..height {
+                let (source, target) = (self.blurred.row(v), self.scratch.row_mut(v));
+                for (t, w) in target[1.min(width)..].iter_mut().zip(source.windows(3)) {
+                    *t = (w[0] + 2 * w[1] + w[2] + 2) >> 2;
+                }
+                // Beyond the ends the last pixel goes on.
+                let last = width - 1;
+                target[0] = (3 * source[0] + source[1.min(last)] + 2) >> 2;
+                target[last] = (3 * source[last] + source[last.saturating_sub(1)] + 2) >> 2;
+            }
+            for v in 0..height {
+                let (above, below) = (self.scratch.row(v.saturating_sub(1)), self.scratch.row((v + 1).min(height - 1)));
+                let here = self.scratch.row(v);
+                for (t, ((&a, &h), &b)) in self.blurred.row_mut(v).iter_mut().zip(above.iter().zip(here).zip(below)) {
+                    *t = (a + 2 * h + b + 2) >> 2;
+                }
+            }
+        }
+    }
+
+    /// Mean over each pixel's block, as far as it lies inside the picture, from `sums` into `mean`.
+    fn box_mean(&mut self) {
+        let (width, height) = (self.mean.width(), self.mean.height());
+        let stride = width + 1;
+        for v in 0..height {
+            for tile in 0..self.tiles_wide {
+                let half = usize::from(self.half_blocks[(v / TILE) * self.tiles_wide + tile]);
+                let (top, bottom) = (v.saturating_sub(half) * stride, (v + half + 1).min(height) * stride);
+                let rows = (bottom - top) / stride;
+                let (start, end) = (tile * TILE, (tile * TILE + TILE).min(width));
+                let mean = &mut self.mean.row_mut(v)[start..end];
+                if start >= half && end + half <= width {
+                    let count = end - start;
+                    let slice = |row: usize, u: usize| &self.sums[row + u..][..count];
+                    let (right, left) = (start + half + 1, start - half);
+                    let corners = slice(bottom, right).iter().zip(slice(bottom, left));
+                    let corners = corners.zip(slice(top, right).iter().zip(slice(top, left)));
+                    let scale = 1.0 / (rows * (2 * half + 1)) as f32;
+                    for (m, ((&br, &bl), (&tr, &tl))) in mean.iter_mut().zip(corners) {
+                        let sum = br.wrapping_sub(bl).wrapping_sub(tr).wrapping_add(tl);
+                        *m = (sum as f32).mul_add(scale, 0.5) as u16;
+                    }
+                } else {
+                    for (k, m) in mean.iter_mut().enumerate() {
+                        let (left, right) = ((start + k).saturating_sub(half), (start + k + half + 1).min(width));
+                        let sum = self.sums[bottom + right]
+                            .wrapping_sub(self.sums[bottom + left])
+                            .wrapping_sub(self.sums[top + right])
+                            .wrapping_add(self.sums[top + left]);
+                        *m = (sum as f32 / (rows * (right - left)) as f32 + 0.5) as u16;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Threshold offset per tile: mean absolute deviation over the tiles that the block touches.
+    fn measure_spread(&mut self, config: &Config) {
+        let (width, height) = (self.deviation.width(), self.deviation.height());
+        let (wide, high) = (self.tiles_wide, self.tiles_high);
+        self.spread.clear();
+        self.spread.resize(wide * high, 0.0);
+        for v in 0..height {
+            for (tile, part) in self.deviation.row(v).chunks(TILE).enumerate() {
+                let sum: u32 = part.iter().map(|&d| u32::from(d.unsigned_abs())).sum();
+                self.spread[(v / TILE) * wide + tile] += sum as f32;
+            }
+        }
+        self.offsets.clear();
+        for row in 0..high {
+            for col in 0..wide {
+                let reach = usize::from(self.half_blocks[row * wide + col]).div_ceil(TILE);
+                let (left, right) = (col.saturating_sub(reach), (col + reach + 1).min(wide));
+                let (top, bottom) = (row.saturating_sub(reach), (row + reach + 1).min(high));
+                let sum: f32 = (top..bottom).map(|r| self.spread[r * wide..][left..right].iter().sum::<f32>()).sum();
+                let pixels = ((right * TILE).min(width) - left * TILE) * ((bottom * TILE).min(height) - top * TILE);
+                let offset = config.offset_deviations as f32 * sum / pixels as f32;
+                self.offsets.push(offset.max((config.offset_grey * SCALE) as f32).min(4080.0));
+            }
+        }
+    }
+}
+
+/// Standard deviation, px, that OpenCV's adaptive threshold gives its Gaussian for a block of this side.
+fn gaussian_sigma(block: f64) -> f64 {
+    (0.3 * ((block - 1.0) * 0.5 - 1.0) + 0.8).max(0.8)
+}
+
+/// The tiles before and after a pixel and how far it is from the first to the second. Beyond the outer tiles' middles the last goes on.
+fn between_tiles(pixel: usize, tiles: usize) -> (usize, usize, f32) {
+    let half = TILE / 2;
+    if pixel < half {
+        return (0, 0, 0.0);
+    }
+    let tile = (pixel - half) / TILE;
+    let (first, second) = (tile.min(tiles - 1), (tile + 1).min(tiles - 1));
+    (first, second, (pixel - half - tile * TILE) as f32 / TILE as f32)
+}
+
+/// Sums over all pixels above and left of each, with a first row and column of zeros.
+fn sum_up(source: &Image<u16>, sums: &mut Vec<u32>) {
+    let (width, height) = (source.width(), source.height());
+    let stride = width + 1;
+    sums.clear();
+    sums.resize(stride * (height + 1), 0);
+    for v in 0..height {
+        let (above, here) = sums.split_at_mut((v + 1) * stride);
+        let above = &above[v * stride..];
+        let mut row = 0_u32;
+        for ((s, &a), &p) in here[1..stride].iter_mut().zip(&above[1..]).zip(source.row(v)) {
+            row = row.wrapping_add(u32::from(p));
+            *s = a.wrapping_add(row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use net_image::View;
+
+    use super::*;
+
+    /// A picture of coarse random waves; deterministic.
+    fn picture(width: usize, height: usize) -> Vec<u8> {
+        let mut state = 12345_u32;
+        (0..width * height)
+            .map(|k| {
+                state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+                let (u, v) = ((k % width) as f64, (k / width) as f64);
+                let wave = 60.0 * (u * 0.31).sin() * (v * 0.23).cos();
+                (128.0 + wave + f64::from(state >> 24) / 16.0) as u8
+            })
+            .collect()
+    }
+
+    fn naive_mean(blurred: &Image<u16>, u: usize, v: usize, half: usize) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for y in v.saturating_sub(half)..(v + half + 1).min(blurred.height()) {
+            for x in u.saturating_sub(half)..(u + half + 1).min(blurred.width()) {
+                sum += f64::from(blurred.row(y)[x]);
+                count += 1.0;
+            }
+        }
+        sum / count
+    }
+
+    #[test]
+    fn the_mean_is_the_mean_of_a_block_that_follows_the_cell() {
+        let (width, height) = (131, 77);
+        let data = picture(width, height);
+        let view = View::packed(&data, width, height).expect("a whole image");
+        let mut threshold = Threshold::default();
+        let side = |p: Vector2<f64>| Some(5.0 + p.x * 0.2);
+        threshold.prepare(view, &Config::default(), side);
+        for v in [0, 3, 40, 76] {
+            for u in 0..width {
+                let middle = ((u / TILE * TILE + TILE / 2).min(width - 1)) as f64;
+                let half = ((side(Vector2::new(middle, 0.0)).unwrap_or(0.0) * Config::default().block_cells - 1.0)
+                    * 0.5)
+                    .round() as usize;
+                let expected = naive_mean(&threshold.blurred, u, v, half);
+                // Rounded to a sixteenth of a grey level.
+                assert!((f64::from(threshold.mean.row(v)[u]) - expected).abs() <= 0.51, "at ({u}, {v})");
+            }
+        }
+    }
+
+    #[test]
+    fn three_boxes_come_close_to_the_gaussian() {
+        let (width, height) = (64, 64);
+        let mut data = vec![0_u8; width * height];
+        data[32 * width + 32] = 255;
+        let view = View::packed(&data, width, height).expect("a whole image");
+        let mut threshold = Threshold::default();
+        let config = Config {
+            block_px: Some(15),
+            mean: LocalMean::Gaussian,
+            blur_min_px: 0.0,
+            blur_cells: 0.0,
+            ..Config::default()
+        };
+        threshold.prepare(view, &config, |_| None);
+        let sigma = gaussian_sigma(15.0);
+        let spread: f64 = (0..width).map(|u| f64::from(threshold.mean.row(32)[u]) * (u as f64 - 32.0).powi(2)).sum();
+        let mass: f64 = (0..width).map(|u| f64::from(threshold.mean.row(32)[u])).sum();
+        // Boxes of whole odd widths reach the variance to 15 %.
+        assert!(
+            (spread / mass / (sigma * sigma) - 1.0).abs() < 0.15,
+            "variance {} for {}",
+            spread / mass,
+            sigma * sigma
+        );
+    }
+
+    #[test]
+    fn light_and_dark_are_mirror_images() {
+        let (width, height) = (90, 50);
+        let data = picture(width, height);
+        let mirrored: Vec<u8> = data.iter().map(|p| 255 - p).collect();
+        let side = |_| Some(12.0);
+        let (mut a, mut b) = (Threshold::default(), Threshold::default());
+        a.prepare(View::packed(&data, width, height).expect("a whole image"), &Config::default(), side);
+        b.prepare(View::packed(&mirrored, width, height).expect("a whole image"), &Config::default(), side);
+        let (light, dark) = (a.level(true), b.level(false));
+        for v in 0..height {
+            for (x, y) in light.row(v).iter().zip(dark.row(v)) {
+                // Rounding of blur and mean goes up in both.
+                assert!((x - y).abs() <= 4);
+            }
+        }
+    }
+
+    #[test]
+    fn the_frame_is_twine() {
+        let data = [10_u8; 12];
+        let mut threshold = Threshold::default();
+        threshold.prepare(View::packed(&data, 4, 3).expect("a whole image"), &Config::default(), |_| Some(4.0));
+        let level = threshold.level(true);
+        assert_eq!(level.values().iter().filter(|&&l| l == FRAME).count(), 6 * 5 - 12);
+        // Flat water is no twine.
+        assert!((0..3).all(|v| level.row(v).iter().all(|&l| l < 0)));
+    }
+
+    #[test]
+    fn any_size_is_taken() {
+        for (width, height) in [(1, 1), (1, 40), (40, 1), (2, 2), (17, 16)] {
+            let data = picture(width, height);
+            let mut threshold = Threshold::default();
+            threshold
+                .prepare(View::packed(&data, width, height).expect("a whole image"), &Config::default(), |_| Some(9.0));
+            assert_eq!(threshold.level(false).values().len(), (width + 2) * (height + 2));
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Outlines of the mesh openings: border following on the signed threshold level.
+//!
+//! Openings are 4-connected and twine is 8-connected, so that a twine one pixel wide closes its mesh also where it runs diagonally. The
+//! follower walks the cracks between pixels with the opening on its right and passes every crack once, so the work is
+//! proportional to the length of all borders. Each crack gives one outline point, where the level crosses zero between the two pixels.
+
+use net_geometry::nalgebra::Vector2;
+
+use crate::contour::threshold::Level;
+
+/// The closed outline of an opening.
+#[derive(Debug)]
+pub(crate) struct Outline<'a> {
+    /// Crossings of the threshold, px, in the sense from u to v.
+    pub points: &'a [Vector2<f64>],
+    /// Enclosed area, px² (Green's theorem on the points).
+    pub area: f64,
+    /// Whether the picture's end cuts the opening.
+    pub cut: bool,
+}
+
+/// Follows outlines; keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct Tracer {
+    /// Pixels whose left crack has been passed.
+    passed: Vec<bool>,
+    points: Vec<Vector2<f64>>,
+}
+
+impl Tracer {
+    /// Hands every opening's outer outline of at most `longest` points to `visit`, in the order of their top-left pixels.
+    /// Outlines of twine inside an opening are left out.
+    pub fn trace(&mut self, level: &Level, longest: usize, mut visit: impl FnMut(Outline)) {
+        let stride = level.stride();
+        self.passed.clear();
+        self.passed.resize(level.values().len(), false);
+        for v in 0..level.height() {
+            let first = (v + 1) * stride + 1;
+            let row = &level.values()[first - 1..][..level.width() + 1];
+            for (u, pair) in row.windows(2).enumerate() {
+                if pair[0] >= 0 && pair[1] < 0 && !self.passed[first + u] {
+                    self.follow(level, first + u, longest, &mut visit);
+                }
+            }
+        }
+    }
+
+    /// Walks the border that begins at the left crack of pixel `start`.
+    fn follow(&mut self, level: &Level, start: usize, longest: usize, visit: &mut impl FnMut(Outline)) {
+        let (values, stride) = (level.values(), level.stride());
+        // East, south, west, north: turning right adds one.
+        let steps = [1_isize, stride as isize, -1, -(stride as isize)];
+        let unit = [Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0), Vector2::new(-1.0, 0.0), Vector2::new(0.0, -1.0)];
+        // The frame is one pixel wide, so a step from a pixel of the picture, or one more to the side, stays inside `values`.
+        let at = |pixel: usize, direction: usize| pixel.wrapping_add_signed(steps[direction]);
+        self.points.clear();
+        let (mut cut, mut doubled_area) = (false, 0_i64);
+        let (mut pixel, mut heading) = (start, 3);
+        loop {
+            let left = (heading + 3) & 3;
+            let outside = at(pixel, left);
+            let (u, v) = ((pixel % stride) as i64 - 1, (pixel / stride) as i64 - 1);
+            if heading == 3 {
+                self.passed[pixel] = true;
+            }
+            // The crack's part of the shoelace sum: only cracks along u add v du.
+            match heading {
+                0 => doubled_area -= 2 * v,
+                2 => doubled_area += 2 * (v + 1),
+                _ => {}
+            }
+            if u == 0 && left == 2
+                || v == 0 && left == 3
+                || u + 1 == level.width() as i64 && left == 0
+                || v + 1 == level.height() as i64 && left == 1
+            {
+                cut = true;
+            }
+            if self.points.len() <= longest {
+                let (inner, outer) = (f64::from(values[pixel]), f64::from(values[outside]));
+                // inner < 0 <= outer; the frame's level is no measurement.
+                let part = if values[outside] == i16::MAX { 0.5 } else { inner / (inner - outer) };
+                self.points.push(Vector2::new(u as f64, v as f64) + unit[left] * part);
+            }
+            let ahead = at(pixel, heading);
+            if values[ahead] >= 0 {
+                heading = (heading + 1) & 3;
+            } else if values[at(ahead, left)] >= 0 {
+                pixel = ahead;
+            } else {
+                pixel = at(ahead, left);
+                heading = left;
+            }
+            if pixel == start && heading == 3 {
+                break;
+            }
+        }
+        if doubled_area > 0 && self.points.len() <= longest {
+            visit(Outline { points: &self.points, area: polygon_area(&self.points), cut });
+        }
+    }
+}
+
+/// Area of a polygon, px², positive in the sense from u to v (Green's theorem).
+pub fn polygon_area(points: &[Vector2<f64>]) -> f64 {
+    let Some(&first) = points.first() else { return 0.0 };
+    // Relative to the first point: no large numbers cancel.
+    points.windows(2).map(|w| (w[0] - first).perp(&(w[1] - first))).sum::<f64>() * 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use imageproc::contours::{BorderType, find_contours};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Level ±1 of a mask: outline points are midpoints of cracks.
+    fn level_of(mask: &[bool], width: usize) -> Level {
+        Level::from_fn(width, mask.len() / width, |u, v| if mask[v * width + u] { 1 } else { -1 })
+    }
+
+    /// Pixels of twine across the outline's cracks.
+    fn twine_beside(points: &[Vector2<f64>], mask: &[bool], width: usize) -> BTreeSet<(u32, u32)> {
+        points
+            .iter()
+            .map(|p| {
+                let (a, b) = ((p.x.floor() as u32, p.y.floor() as u32), (p.x.ceil() as u32, p.y.ceil() as u32));
+                if mask[a.1 as usize * width + a.0 as usize] { a } else { b }
+            })
+            .collect()
+    }
+
+    fn holes_by_imageproc(mask: &[bool], width: usize) -> Vec<BTreeSet<(u32, u32)>> {
+        let height = mask.len() / width;
+        let picture = image::GrayImage::from_fn(width as u32, height as u32, |x, y| {
+            image::Luma([u8::from(mask[y as usize * width + x as usize]) * 255])
+        });
+        let mut holes: Vec<_> = find_contours::<u32>(&picture)
+            .iter()
+            .filter(|c| c.border_type == BorderType::Hole)
+            .map(|c| c.points.iter().map(|p| (p.x, p.y)).collect())
+            .collect();
+        holes.sort();
+        holes
+    }
+
+    fn holes_by_us(mask: &[bool], width: usize) -> Vec<BTreeSet<(u32, u32)>> {
+        let mut holes = Vec::new();
+        Tracer::default().trace(&level_of(mask, width), usize::MAX, |outline| {
+            if !outline.cut {
+                holes.push(twine_beside(outline.points, mask, width));
+            }
+        });
+        holes.sort();
+        holes
+    }
+
+    /// A mask with twine all round, as imageproc takes the picture's end for background.
+    fn framed(mut mask: Vec<bool>, width: usize) -> Vec<bool> {
+        let height = mask.len() / width;
+        for (k, m) in mask.iter_mut().enumerate() {
+            let (u, v) = (k % width, k / width);
+            *m |= u == 0 || v == 0 || u + 1 == width || v + 1 == height;
+        }
+        mask
+    }
+
+    proptest! {
+        #[test]
+        fn the_openings_are_the_holes_that_imageproc_finds(
+            width in 3_usize..24,
+            bits in prop::collection::vec(prop::bool::weighted(0.55), 24 * 16),
+        ) {
+            let mask = framed(bits[..width * 16].to_vec(), width);
+            prop_assert_eq!(holes_by_us(&mask, width), holes_by_imageproc(&mask, width));
+        }
+
+        #[test]
+        fn every_opening_is_seen_once_whatever_the_picture(
+            width in 1_usize..24,
+            bits in prop::collection::vec(any::<bool>(), 24 * 12),
+        ) {
+            let mask = &bits[..width * 12];
+            let mut count = 0;
+            Tracer::default().trace(&level_of(mask, width), usize::MAX, |outline| {
+                count += 1;
+                assert!(outline.area > 0.0);
+            });
+            prop_assert_eq!(count, components(mask, width));
+        }
+    }
+
+    /// Number of 4-connected openings, by flood fill.
+    fn components(mask: &[bool], width: usize) -> usize {
+        let mut seen = mask.to_vec();
+        let mut count = 0;
+        for start in 0..seen.len() {
+            if seen[start] {
+                continue;
+            }
+            count += 1;
+            let mut stack = vec![start];
+            while let Some(k) = stack.pop() {
+                if std::mem::replace(&mut seen[k], true) {
+                    continue;
+                }
+                let u = k % width;
+                stack.extend((u > 0).then(|| k - 1));
+                stack.extend((u + 1 < width).then_some(k + 1));
+                stack.extend(k.checked_sub(width));
+                stack.extend((k + width < mask.len()).then_some(k + width));
+            }
+        }
+        count
+    }
+
+    #[test]
+    fn the_outline_of_a_ramped_square_is_where_the_ramp_crosses_zero() {
+        // Distance to a square's border, 10 levels a pixel; its true sides lie between the pixels.
+        let (middle, half) = (Vector2::new(20.3, 18.6), 6.4);
+        let level = Level::from_fn(40, 40, |u, v| {
+            let d = Vector2::new(u as f64, v as f64) - middle;
+            ((d.x.abs().max(d.y.abs()) - half) * 1000.0) as i16
+        });
+        let mut seen = 0;
+        Tracer::default().trace(&level, usize::MAX, |outline| {
+            seen += 1;
+            assert!(!outline.cut);
+            for p in outline.points {
+                let d = (p - middle).abs();
+                // The ramp is not straight within a pixel of a corner.
+                if d.min() > half - 1.0 {
+                    continue;
+                }
+                // Levels are whole thousandths.
+                assert!((d.max() - half).abs() < 2e-3, "{p}");
+            }
+            // Four corners cut off between two points, each less than half a square pixel.
+            assert!((outline.area - 4.0 * half * half).abs() < 2.0, "{}", outline.area);
+        });
+        assert_eq!(seen, 1);
+    }
+
+    #[test]
+    fn openings_at_the_end_of_the_picture_are_called_cut() {
+        let mask: Vec<bool> = (0..9 * 9).map(|k| k % 9 == 4 || k / 9 == 4).collect();
+        let mut cuts = Vec::new();
+        Tracer::default().trace(&level_of(&mask, 9), usize::MAX, |outline| cuts.push(outline.cut));
+        assert_eq!(cuts, [true; 4]);
+    }
+
+    #[test]
+    fn long_outlines_are_left_out() {
+        let mask = framed(vec![false; 20 * 20], 20);
+        let mut seen = 0;
+        Tracer::default().trace(&level_of(&mask, 20), 71, |_| seen += 1);
+        assert_eq!(seen, 0);
+        Tracer::default().trace(&level_of(&mask, 20), 72, |_| seen += 1);
+        assert_eq!(seen, 1);
+    }
+}

@@ -1,0 +1,54 @@
+//! Is it a net, and is the answer right? Statistics that a flexible fit cannot raise, and a probability from them.
+
+use crate::lockin::Measurement;
+
+/// Coherence of the phases left over in the tiles.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evidence {
+    /// Coherence of the fundamental per family: sqrt(2/N) times the sum of the cosines of the residual phases. Without a net about N(0, 1), a
+    /// little more after a flexible fit.
+    pub v: [f64; 2],
+    /// The same of the second harmonic, which is never fitted; the fundamental's where no tile resolves it.
+    pub v2: [f64; 2],
+    /// Share of tiles with both residual phases below 1 rad.
+    pub good: f64,
+    /// Tiles that counted.
+    pub tiles: usize,
+    /// Tiles that counted for the second harmonic.
+    pub tiles2: usize,
+}
+
+impl Evidence {
+    pub(crate) fn new(measurements: &[Measurement]) -> Self {
+        let mut e = Self::default();
+        let mut sum = [0.0; 2];
+        let mut sum2 = [0.0; 2];
+        let mut aligned = 0usize;
+        for m in measurements.iter().filter(|m| m.good) {
+            e.tiles += 1;
+            aligned += usize::from(m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
+            let second = m.k[0].max(m.k[1]) < 1.0 / 6.0;
+            e.tiles2 += usize::from(second);
+            for f in 0..2 {
+                sum[f] += m.phase[f].cos();
+                if second {
+                    sum2[f] += m.phase2[f].cos();
+                }
+            }
+        }
+        if e.tiles > 0 {
+            e.v = sum.map(|s| s * f64::sqrt(2.0 / e.tiles as f64));
+            e.good = aligned as f64 / e.tiles as f64;
+        }
+        e.v2 = if e.tiles2 > 8 { sum2.map(|s| s * f64::sqrt(2.0 / e.tiles2 as f64)) } else { e.v };
+        e
+    }
+
+    /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
+    pub fn probability(&self) -> f64 {
+        let v = self.v[0].min(self.v[1]);
+        let v2 = self.v2[0].abs().min(self.v2[1].abs());
+        let logit = -4.0 + 0.47 * v + 0.53 * v2;
+        1.0 / (1.0 + (-logit).exp())
+    }
+}

@@ -1,0 +1,320 @@
+//! The picture against a drawing of the net: how much better it is explained with the net than without, and by how much each tile would
+//! move the net.
+
+use net_image::Image;
+
+use crate::fit::Observation;
+use crate::map::PhaseMap;
+use crate::numeric::{log2_rough, magnitude_quantile, median, wrap};
+use crate::smooth::Smoother;
+use crate::surface::Surface;
+use crate::template::{Profile, look_up};
+use crate::view::{BLOCK, Level, TileGrid};
+
+const PIXELS: usize = BLOCK * BLOCK;
+type Block = [f32; PIXELS];
+
+/// Bright twine on dark water, or dark twine on bright water.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Polarity {
+    /// Twine brighter than what is behind it.
+    Bright,
+    /// Twine darker than what is behind it.
+    Dark,
+}
+
+impl Polarity {
+    pub(crate) fn sign(self) -> f32 {
+        match self {
+            Self::Bright => 1.0,
+            Self::Dark => -1.0,
+        }
+    }
+}
+
+/// How the net is drawn and compared.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drawing {
+    pub polarity: Polarity,
+    /// Blur of the picture, px of the level, one standard deviation.
+    pub blur: f64,
+    /// Added to both coordinates, cells: half a cell turns bright twine's lock-in into dark twine's.
+    pub offset: f32,
+    /// Length over which the contrast may change, px of the level.
+    pub contrast_length: f64,
+    /// Length of the high-pass filter, px of the level.
+    pub high_pass: f64,
+    /// Compare every second block only.
+    pub sparse: bool,
+}
+
+/// Buffers of the comparison; one picture, many drawings.
+#[derive(Debug, Default)]
+pub(crate) struct Likelihood {
+    blocks_x: usize,
+    blocks_y: usize,
+    image: Vec<Block>,
+    drawn: Vec<Block>,
+    d1: Vec<Block>,
+    d2: Vec<Block>,
+    used: Vec<bool>,
+    /// Robust noise level of the high-passed picture.
+    noise: f32,
+    mean: Image<f32>,
+    smooth: Image<f32>,
+    num: Image<f32>,
+    den: Image<f32>,
+    amplitude: Image<f32>,
+    variance: Image<f32>,
+    profiles: [Profile; 2],
+    histogram: Vec<u32>,
+    order: Vec<f64>,
+    /// Gradient and information of both coordinates per tile: g1, g2, h11, h12, h22.
+    tiles: Vec<[f64; 5]>,
+    /// Shifts found in the last call of [`Likelihood::observe`], NaN where there is nothing to see.
+    pub shifts: Vec<[f64; 2]>,
+}
+
+impl Likelihood {
+    /// Takes the high-passed picture of a level.
+    pub(crate) fn load(&mut self, level: &Level) {
+        let (bx, by) = level.blocks();
+        (self.blocks_x, self.blocks_y) = (bx, by);
+        let n = bx * by;
+        self.image.clear();
+        for y in 0..by {
+            let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.high.row(y * BLOCK + r));
+            self.image.extend((0..bx).map(|x| std::array::from_fn(|k| rows[k / BLOCK][x * BLOCK + k % BLOCK])));
+        }
+        for buffer in [&mut self.drawn, &mut self.d1, &mut self.d2] {
+            buffer.resize(n, [0.0; PIXELS]);
+        }
+        self.used.resize(n, false);
+        for small in
+            [&mut self.mean, &mut self.num, &mut self.den, &mut self.amplitude, &mut self.variance, &mut self.smooth]
+        {
+            small.resize(bx, by);
+        }
+        let every = level.high.data().iter().copied();
+        self.noise = (1.4826 * magnitude_quantile(every, 0.5, &mut self.histogram)).max(1e-6);
+    }
+
+    /// Twine widths along the two families, cells.
+    pub(crate) fn set_widths(&mut self, widths: [f64; 2]) {
+        for (p, w) in self.profiles.iter_mut().zip(widths) {
+            p.prepare(w);
+        }
+    }
+
+    /// Draws the net and its derivatives, and removes from it what the high-pass filter removed from the picture.
+    fn draw(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) {
+        let bx = self.blocks_x;
+        for y in 0..self.blocks_y {
+            for x in 0..bx {
+                let b = y * bx + x;
+                self.used[b] = false;
+                let mean = &mut self.mean.data_mut()[b];
+                *mean = 0.0;
+                let Some(planes) = map.block(x, y) else { continue };
+                self.used[b] = !(drawing.sparse && (x + y) % 2 == 1);
+                if !self.used[b] {
+                    continue;
+                }
+                let rows: [_; 2] = std::array::from_fn(|f| {
+                    let p = &planes[f];
+                    self.profiles[f].row(drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt())
+                });
+                let (t, d1, d2) = (&mut self.drawn[b], &mut self.d1[b], &mut self.d2[b]);
+                let mut sum = 0.0;
+                for k in 0..PIXELS {
+                    let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
+                    let at = |p: &crate::map::Plane| wrap(p.s + drawing.offset + p.du * u + p.dv * v);
+                    let (p1, g1) = look_up(rows[0], at(&planes[0]));
+                    let (p2, g2) = look_up(rows[1], at(&planes[1]));
+                    t[k] = 1.0 - (1.0 - p1) * (1.0 - p2);
+                    d1[k] = (1.0 - p2) * g1;
+                    d2[k] = (1.0 - p1) * g2;
+                    sum += t[k];
+                }
+                *mean = sum / PIXELS as f32;
+            }
+        }
+        if drawing.sparse {
+            // Unused neighbours take the mean of the used ones beside them.
+            for y in 0..self.blocks_y {
+                for x in 0..bx {
+                    if (x + y) % 2 == 1 {
+                        let row = &self.mean.data()[y * bx..][..bx];
+                        let (a, b) = (row[x - usize::from(x > 0)], row[(x + 1).min(bx - 1)]);
+                        let value = if x > 0 && x + 1 < bx {
+                            0.5 * (a + b)
+                        } else if x > 0 {
+                            a
+                        } else {
+                            b
+                        };
+                        self.mean.data_mut()[y * bx + x] = value;
+                    }
+                }
+            }
+        }
+        smoother.blur(&self.mean, (drawing.high_pass / BLOCK as f64) as f32, &mut self.smooth);
+        for (b, used) in self.used.iter().enumerate() {
+            if *used {
+                let m = self.smooth.data()[b];
+                self.drawn[b].iter_mut().for_each(|t| *t -= m);
+            }
+        }
+    }
+
+    /// Local contrast of the drawing in the picture, of one sign.
+    fn fit_amplitude(&mut self, drawing: &Drawing, smoother: &mut Smoother) {
+        for b in 0..self.used.len() {
+            let (mut num, mut den) = (0.0f32, 0.0f32);
+            if self.used[b] {
+                for (i, t) in self.image[b].iter().zip(&self.drawn[b]) {
+                    num += i * t;
+                    den += t * t;
+                }
+            }
+            self.num.data_mut()[b] = num;
+            self.den.data_mut()[b] = den;
+        }
+        let sigma = (drawing.contrast_length / BLOCK as f64) as f32;
+        smoother.blur(&self.num, sigma, &mut self.smooth);
+        smoother.blur(&self.den, sigma, &mut self.amplitude);
+        let sign = drawing.polarity.sign();
+        for (a, n) in self.amplitude.data_mut().iter_mut().zip(self.smooth.data()) {
+            *a = (n / (*a + 3e-4) * sign).max(0.0) * sign;
+        }
+    }
+
+    /// Robust log-likelihood gain of the drawing over an empty picture (Cauchy noise), natural units.
+    pub(crate) fn gain(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) -> f64 {
+        self.draw(map, drawing, smoother);
+        self.fit_amplitude(drawing, smoother);
+        let per = 1.0 / (1.5 * self.noise);
+        let mut gain = 0.0f64;
+        for b in 0..self.used.len() {
+            let a = self.amplitude.data()[b];
+            if !self.used[b] || a == 0.0 {
+                continue;
+            }
+            let mut sum = 0.0;
+            for (i, t) in self.image[b].chunks_exact(4).zip(self.drawn[b].chunks_exact(4)) {
+                // One logarithm for four pixels.
+                let (mut without, mut with) = (1.0f32, 1.0f32);
+                for (i, t) in i.iter().zip(t) {
+                    without *= 1.0 + (i * per).powi(2);
+                    with *= 1.0 + ((i - a * t) * per).powi(2);
+                }
+                sum += log2_rough((without / with).clamp(1e-30, 1e30));
+            }
+            gain += f64::from(sum);
+        }
+        gain * std::f64::consts::LN_2 * if drawing.sparse { 2.0 } else { 1.0 }
+    }
+
+    /// Where each tile says the lattice is: its predicted coordinates plus the shift that the picture asks for.
+    pub(crate) fn observe(
+        &mut self,
+        surface: &Surface,
+        map: &PhaseMap,
+        drawing: &Drawing,
+        grid: &TileGrid,
+        smoother: &mut Smoother,
+        out: &mut Vec<Observation>,
+    ) {
+        self.draw(map, drawing, smoother);
+        self.fit_amplitude(drawing, smoother);
+        self.cap_amplitude();
+        let clip = (4.0 * self.noise).powi(2);
+        for b in 0..self.used.len() {
+            let a = self.amplitude.data()[b];
+            // Without a drawing the picture itself is the residual.
+            let a = if self.used[b] { a } else { 0.0 };
+            let sum: f32 = self.image[b].iter().zip(&self.drawn[b]).map(|(i, t)| (i - a * t).powi(2).min(clip)).sum();
+            self.num.data_mut()[b] = sum / PIXELS as f32;
+        }
+        smoother.blur(&self.num, (drawing.contrast_length / BLOCK as f64) as f32, &mut self.variance);
+        self.tiles.clear();
+        self.tiles.resize(grid.nx * grid.ny, [0.0; 5]);
+        for y in 0..self.blocks_y {
+            let tiles = &mut self.tiles[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
+            for x in 0..self.blocks_x {
+                let b = y * self.blocks_x + x;
+                let a = self.amplitude.data()[b];
+                if !self.used[b] || a == 0.0 {
+                    continue;
+                }
+                let variance = self.variance.data()[b].max(1e-7);
+                let per = 1.0 / variance.sqrt();
+                let mut sums = [0.0f32; 5];
+                for k in 0..PIXELS {
+                    let r = self.image[b][k] - a * self.drawn[b][k];
+                    let e = r.abs() * per;
+                    let w = if e < 3.0 {
+                        1.0
+                    } else if e < 6.0 {
+                        3.0 / e
+                    } else {
+                        0.0
+                    };
+                    let (d1, d2) = (a * self.d1[b][k], a * self.d2[b][k]);
+                    sums[0] += w * d1 * r;
+                    sums[1] += w * d2 * r;
+                    sums[2] += w * d1 * d1;
+                    sums[3] += w * d1 * d2;
+                    sums[4] += w * d2 * d2;
+                }
+                let tile = &mut tiles[usize::from(grid.column[x])];
+                for (t, s) in tile.iter_mut().zip(sums) {
+                    *t += f64::from(s / variance);
+                }
+            }
+        }
+        self.solve_tiles(surface, grid, out);
+    }
+
+    /// No contrast beyond four times the median: a fish's edge is not twine.
+    fn cap_amplitude(&mut self) {
+        self.order.clear();
+        self.order.extend(self.amplitude.data().iter().filter(|a| **a != 0.0).map(|a| f64::from(a.abs())));
+        let cap = (4.0 * median(&mut self.order)) as f32;
+        for a in self.amplitude.data_mut() {
+            *a = a.clamp(-cap, cap);
+        }
+    }
+
+    /// Two numbers per tile from its gradient and information.
+    fn solve_tiles(&mut self, surface: &Surface, grid: &TileGrid, out: &mut Vec<Observation>) {
+        // No tile claims better than this, cells: knots are not where a perfect lattice has them.
+        const FLOOR: f64 = 0.004 * 0.004;
+        self.order.clear();
+        self.order.extend(self.tiles.iter().map(|t| t[2] + t[4]).filter(|t| *t > 0.0));
+        let least = 1e-3 * median(&mut self.order);
+        let chart = surface.chart();
+        out.clear();
+        self.shifts.clear();
+        for (site, t) in grid.sites.iter().zip(&self.tiles) {
+            let mut o = Observation { site: *site, s: [0.0; 2], weight: [0.0; 3] };
+            let trace = t[2] + t[4];
+            let point = chart.at(site.ray[0], site.ray[1]);
+            self.shifts.push([f64::NAN; 2]);
+            if let (true, Some(p)) = (site.valid && trace > least && trace > 0.0, point) {
+                let ridge = 1e-2 * trace + 1e-6;
+                let (a, b, c) = (t[2] + ridge, t[3], t[4] + ridge);
+                let det = a * c - b * b;
+                let shift = [(c * t[0] - b * t[1]) / det, (a * t[1] - b * t[0]) / det].map(|s| s.clamp(-0.12, 0.12));
+                o.s = [p.s[0] + shift[0], p.s[1] + shift[1]];
+                let (ia, ib, ic) = (c / det + FLOOR, -b / det, a / det + FLOOR);
+                let idet = ia * ic - ib * ib;
+                o.weight = [ic / idet, -ib / idet, ia / idet];
+                if let Some(last) = self.shifts.last_mut() {
+                    *last = shift;
+                }
+            }
+            out.push(o);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Lock-in: the picture multiplied by the predicted waves and summed over tiles. What phase is left over says where the lattice really is.
+
+use crate::map::PhaseMap;
+use crate::numeric::sin_cos_cycles;
+use crate::surface::{Point, Surface};
+use crate::view::{BLOCK, Level, Site, View};
+
+/// Sums over one tile.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TileSum {
+    /// Demodulated sums of both families, real and imaginary, at the wave asked for.
+    pub z: [[f64; 2]; 2],
+    /// The same at twice its frequency.
+    pub z2: [[f64; 2]; 2],
+    /// Sum of squares.
+    pub power: f64,
+    /// Pixels.
+    pub count: f64,
+}
+
+/// What a tile says about the lattice.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measurement {
+    pub site: Site,
+    /// Predicted coordinates and depth.
+    pub predicted: Point,
+    /// Residual phases, rad: zero when the prediction is right (for bright twine).
+    pub phase: [f64; 2],
+    /// Residual phases of the second harmonic, rad.
+    pub phase2: [f64; 2],
+    /// Power in the wave against the mean of noise.
+    pub snr: [f64; 2],
+    /// Length of the wave vectors, cells per full-resolution px.
+    pub k: [f64; 2],
+    /// Demodulated sums.
+    pub z: [[f64; 2]; 2],
+    /// Whether it counts: enough of it shows the sheet, and cells there are wider than 3 px.
+    pub good: bool,
+}
+
+/// Demodulates `high` of a level over its tiles.
+pub(crate) fn demodulate(level: &Level, tiling: usize, map: &PhaseMap, gain: f32, sums: &mut Vec<TileSum>) {
+    let grid = &level.tiles[tiling];
+    sums.clear();
+    sums.resize(grid.nx * grid.ny, TileSum::default());
+    let (bx, by) = level.blocks();
+    for y in 0..by {
+        let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.high.row(y * BLOCK + r));
+        let tiles = &mut sums[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
+        for x in 0..bx {
+            let Some(planes) = map.block(x, y) else { continue };
+            let tile = &mut tiles[usize::from(grid.column[x])];
+            let mut p = [[0.0f32; 4]; 4];
+            let mut power = 0.0;
+            for (p, row) in p.iter_mut().zip(rows) {
+                for (p, i) in p.iter_mut().zip(&row[x * BLOCK..][..BLOCK]) {
+                    *p = (i * gain).clamp(-1.0, 1.0);
+                    power += *p * *p;
+                }
+            }
+            tile.power += f64::from(power);
+            tile.count += (BLOCK * BLOCK) as f64;
+            for (f, w) in planes.iter().enumerate() {
+                let (s, c) = sin_cos_cycles(w.s);
+                let first = wave(&p, w.du, w.dv);
+                tile.z[f][0] += f64::from(first.0 * c + first.1 * s);
+                tile.z[f][1] += f64::from(first.1 * c - first.0 * s);
+                let (s2, c2) = (2.0 * s * c, 1.0 - 2.0 * s * s);
+                let second = wave(&p, 2.0 * w.du, 2.0 * w.dv);
+                tile.z2[f][0] += f64::from(second.0 * c2 + second.1 * s2);
+                tile.z2[f][1] += f64::from(second.1 * c2 - second.0 * s2);
+            }
+        }
+    }
+}
+
+/// Sum of p exp(-2 pi j (du u + dv v)) over a block about its middle.
+#[inline]
+fn wave(p: &[[f32; 4]; 4], du: f32, dv: f32) -> (f32, f32) {
+    let (s1, c1) = sin_cos_cycles(0.5 * du);
+    let (s3, c3) = (s1 * (3.0 - 4.0 * s1 * s1), c1 * (4.0 * c1 * c1 - 3.0));
+    let row = |r: &[f32; 4]| ((r[1] + r[2]) * c1 + (r[0] + r[3]) * c3, (r[1] - r[2]) * s1 + (r[0] - r[3]) * s3);
+    let r: [(f32, f32); 4] = std::array::from_fn(|i| row(&p[i]));
+    let (s1, c1) = sin_cos_cycles(0.5 * dv);
+    let (s3, c3) = (s1 * (3.0 - 4.0 * s1 * s1), c1 * (4.0 * c1 * c1 - 3.0));
+    // Row -1.5 carries exp(+3j a), row 1.5 exp(-3j a).
+    let re = (r[1].0 + r[2].0) * c1 + (r[0].0 + r[3].0) * c3 - (r[1].1 - r[2].1) * s1 - (r[0].1 - r[3].1) * s3;
+    let im = (r[1].1 + r[2].1) * c1 + (r[0].1 + r[3].1) * c3 + (r[1].0 - r[2].0) * s1 + (r[0].0 - r[3].0) * s3;
+    (re, im)
+}
+
+/// Turns sums into measurements.
+///
+/// `sign`: 1 for bright twine, -1 for dark.
+pub(crate) fn measure(
+    surface: &Surface,
+    view: &View,
+    (level, tiling): (usize, usize),
+    sign: f64,
+    sums: &[TileSum],
+    out: &mut Vec<Measurement>,
+) {
+    let chart = surface.chart();
+    let level = &view.levels[level];
+    let grid = &level.tiles[tiling];
+    out.clear();
+    for (site, sum) in grid.sites.iter().zip(sums) {
+        let mut m = Measurement {
+            site: *site,
+            predicted: Point::default(),
+            phase: [0.0; 2],
+            phase2: [0.0; 2],
+            snr: [0.0; 2],
+            k: [f64::INFINITY; 2],
+            z: sum.z,
+            good: false,
+        };
+        let at = |r: &[f64; 2]| chart.at(r[0], r[1]);
+        if let (true, Some(p), Some(pu), Some(pv)) = (site.valid, at(&site.ray), at(&site.next[0]), at(&site.next[1])) {
+            m.predicted = p;
+            for f in 0..2 {
+                m.phase[f] = (sign * sum.z[f][1]).atan2(sign * sum.z[f][0]);
+                m.phase2[f] = (sign * sum.z2[f][1]).atan2(sign * sum.z2[f][0]);
+                m.snr[f] = (sum.z[f][0].powi(2) + sum.z[f][1].powi(2)) / (0.5 * sum.power + 1e-9);
+                m.k[f] = (pu.s[f] - p.s[f]).hypot(pv.s[f] - p.s[f]);
+            }
+            let resolved = m.k[0].max(m.k[1]) < 1.0 / (3.0 * view.reduction as f64);
+            m.good = sum.count > 0.5 * grid.area && resolved;
+        }
+        out.push(m);
+    }
+}

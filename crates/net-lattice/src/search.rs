@@ -1,0 +1,365 @@
+//! Cold search: which planes, turns, depths and crossing angles put the harmonics of both families of twine on power in all tiles.
+//!
+//! A family's wave vectors depend on the normal, on the direction of its dual vector in the plane and on depth over spacing only, so the
+//! score is tabulated per family over (normal, direction, depth) and hypotheses are pairs of entries. Depths are a twelfth of an octave
+//! apart: harmonics 2, 3, 4, 5 and 6 are 12, 19.02, 24, 27.86 and 31.02 steps up, so harmonics are looked up as well.
+
+use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
+use crate::view::View;
+
+/// Directions of dual vectors: every 5 degrees of the half circle.
+const DIRECTIONS: usize = 36;
+/// Tilts of the normals, degrees, that are tried.
+const TILTS: [f64; 8] = [0.0, 11.0, 22.0, 33.0, 44.0, 54.0, 63.0, 70.0];
+/// Steps of the depth scale to harmonic 1..6.
+const HARMONICS: [usize; 6] = [0, 12, 19, 24, 28, 31];
+/// Variance of a blurred, clipped, whitened bin.
+const VARIANCE: f64 = 0.45;
+
+/// A plane worth a lock-in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Candidate {
+    /// Score, about the number of standard deviations above noise.
+    pub score: f64,
+    pub rotation: Matrix3<f64>,
+    pub depth: f64,
+    pub angle: f64,
+}
+
+/// What the search may look for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scope {
+    /// The mesh's sides, m.
+    pub sides: [f64; 2],
+    /// Nominal crossing angle and its standard deviation, rad.
+    pub angle: f64,
+    pub angle_sigma: f64,
+}
+
+/// One tile's wave of one (normal, direction): where it runs over the spectrum.
+#[derive(Debug, Clone, Copy)]
+struct Walk {
+    /// Bin at step 0 along x and y.
+    x: f32,
+    y: f32,
+    first: u16,
+    end: u16,
+}
+
+/// The table for one bank.
+pub(crate) struct Search {
+    normals: Vec<Matrix3<f64>>,
+    /// Depth over spacing, cells, at step 0, and how many steps.
+    base: f64,
+    steps: usize,
+    /// Steps that are hypotheses' fundamentals.
+    depths: std::ops::Range<usize>,
+    walks: Vec<Walk>,
+    power_of_step: Vec<f32>,
+    sums: Vec<f32>,
+    counts: Vec<u16>,
+    scores: Vec<f32>,
+}
+
+fn basis(tilt: f64, azimuth: f64) -> Matrix3<f64> {
+    Rotation3::new(Vector3::new(tilt * azimuth.cos(), tilt * azimuth.sin(), 0.0)).into_inner()
+}
+
+/// Gradient of the tangent-plane coordinates by the pixel, per metre of depth: rows X and Y, columns u and v. `None` near grazing.
+fn gradient(r: &Matrix3<f64>, site: &crate::view::Site) -> Option<[[f64; 2]; 2]> {
+    let d = Vector3::new(site.ray[0], site.ray[1], 1.0);
+    let n = r.column(2);
+    let nd = n.dot(&d);
+    if !site.valid || nd < 0.08 || n[2] / nd > 14.0 {
+        return None;
+    }
+    let lambda = n[2] / nd;
+    let j = site.jacobian();
+    let row = |i: usize| {
+        let rd = r.column(i).dot(&d);
+        let g = [lambda / nd * (r[(0, i)] * nd - n[0] * rd), lambda / nd * (r[(1, i)] * nd - n[1] * rd)];
+        [g[0] * j[0][0] + g[1] * j[1][0], g[0] * j[0][1] + g[1] * j[1][1]]
+    };
+    Some([row(0), row(1)])
+}
+
+impl Search {
+    /// For cells of `smallest..largest` full-resolution px on the optical axis.
+    pub(crate) fn new(view: &View, bank: &Bank, smallest: f64, largest: f64) -> Self {
+        let mut normals = Vec::new();
+        for tilt in TILTS {
+            let t = tilt.to_radians();
+            let count =
+                if tilt == 0.0 { 1 } else { (std::f64::consts::TAU * t.sin() / 13f64.to_radians()).round() as usize };
+            for a in 0..count {
+                normals.push(basis(t, std::f64::consts::TAU * a as f64 / count as f64 + 0.01 * tilt));
+            }
+        }
+        let scale = view.levels[bank.level].scale;
+        let base = view.focal / largest;
+        let last = (12.0 * (largest / smallest).log2()).ceil() as usize + 1;
+        let steps = last + HARMONICS[5] + 1;
+        let mut walks = Vec::with_capacity(bank.sites.len() * normals.len() * DIRECTIONS);
+        for site in &bank.sites {
+            for r in &normals {
+                let g = gradient(r, site);
+                for k in 0..DIRECTIONS {
+                    let Some(g) = g else {
+                        walks.push(Walk { x: 0.0, y: 0.0, first: 0, end: 0 });
+                        continue;
+                    };
+                    let (s, c) = (k as f64 * std::f64::consts::PI / DIRECTIONS as f64).sin_cos();
+                    // cycles per level px at step 0
+                    let mut x = (c * g[0][0] + s * g[1][0]) * scale * base;
+                    let mut y = (c * g[0][1] + s * g[1][1]) * scale * base;
+                    if x < 0.0 {
+                        (x, y) = (-x, -y);
+                    }
+                    let len = x.hypot(y).max(1e-12);
+                    let n = SIZE as f64;
+                    let first = (12.0 * (2.2 / bank.length as f64 / len).log2()).ceil().clamp(0.0, steps as f64);
+                    let mut end = (12.0 * (HIGHEST / len).log2()).floor() + 1.0;
+                    // Columns and rows end before the corner of the spectrum does.
+                    end = end.min((12.0 * ((COLUMNS as f64 - 1.0) / n / x.max(1e-12)).log2()).floor());
+                    let end = end.clamp(0.0, steps as f64).max(first);
+                    walks.push(Walk { x: (x * n) as f32, y: (y * n) as f32, first: first as u16, end: end as u16 });
+                }
+            }
+        }
+        let cells = normals.len() * DIRECTIONS;
+        let mut counts = vec![0u16; cells * steps];
+        for (w, cell) in walks.iter().zip((0..cells).cycle()) {
+            for c in &mut counts[cell * steps..][usize::from(w.first)..usize::from(w.end)] {
+                *c += 1;
+            }
+        }
+        Self {
+            base,
+            steps,
+            depths: 0..last,
+            power_of_step: (0..steps).map(|k| (k as f64 / 12.0).exp2() as f32).collect(),
+            sums: vec![0.0; cells * steps],
+            scores: vec![0.0; cells * steps],
+            normals,
+            walks,
+            counts,
+        }
+    }
+
+    /// Scores every (normal, direction, depth) for one family.
+    fn tabulate(&mut self, bank: &Bank) {
+        let cells = self.normals.len() * DIRECTIONS;
+        let steps = self.steps;
+        self.sums.fill(0.0);
+        for t in 0..bank.sites.len() {
+            let power = bank.coarse_tile(t);
+            for (w, sums) in self.walks[t * cells..][..cells].iter().zip(self.sums.chunks_exact_mut(steps)) {
+                let range = usize::from(w.first)..usize::from(w.end);
+                for (sum, p) in sums[range.clone()].iter_mut().zip(&self.power_of_step[range]) {
+                    let ix = (w.x * p + 0.5) as usize;
+                    let iy = (w.y * p + (SIZE / 2) as f32 + 0.5) as usize;
+                    *sum += power[(ix * SIZE + iy).min(COLUMNS * SIZE - 1)];
+                }
+            }
+        }
+        // Harmonics, and the score of one family.
+        for c in 0..cells {
+            let (sums, counts) = (&self.sums[c * steps..][..steps], &self.counts[c * steps..][..steps]);
+            let out = &mut self.scores[c * steps..][..steps];
+            for i in self.depths.clone() {
+                let (mut s, mut n) = (0.0f32, 0u32);
+                for h in HARMONICS {
+                    s += sums[i + h];
+                    n += u32::from(counts[i + h]);
+                }
+                out[i] = if n < 4 { -9.0 } else { s / (n as f32 * VARIANCE as f32).sqrt() };
+            }
+        }
+    }
+
+    /// The best hypotheses, refined, best first.
+    pub(crate) fn run(&mut self, bank: &Bank, scope: &Scope, per_angle: usize, found: &mut Vec<Candidate>) {
+        self.tabulate(bank);
+        let steps = self.steps;
+        let step_angle = 180.0 / DIRECTIONS as f64;
+        let nominal = scope.angle.to_degrees();
+        let spread = (1.5 * scope.angle_sigma.to_degrees()).min(15.0);
+        let mut angles: Vec<f64> = [nominal, nominal - spread, nominal + spread]
+            .into_iter()
+            .map(|a| (a / step_angle).round() * step_angle)
+            .filter(|a| (20.0..=160.0).contains(a))
+            .collect();
+        angles.dedup();
+        let [a, b] = scope.sides;
+        // A quarter turn changes nothing on a square mesh but the crossing angle's name.
+        let square = (a / b - 1.0).abs() < 1e-6 && (nominal - 90.0).abs() < 1e-6;
+        let shift = (12.0 * (a / b).log2()).round() as isize;
+        for &angle in &angles {
+            let half_skew = 0.5 * (90.0 - angle);
+            let turn = ((180.0 - angle) / step_angle).round() as usize;
+            let mut best: Vec<(f32, usize, usize, usize)> = Vec::new();
+            for n in 0..self.normals.len() {
+                for i in self.depths.clone() {
+                    let j = i as isize + shift;
+                    if j < 0 || j as usize >= self.depths.end {
+                        continue;
+                    }
+                    let mut top = (f32::NEG_INFINITY, 0);
+                    for k in 0..DIRECTIONS {
+                        let roll = (k as f64 * step_angle + half_skew + 90.0).rem_euclid(180.0) - 90.0;
+                        if square && !(-45.0..45.0).contains(&roll) {
+                            continue;
+                        }
+                        let at = |k: usize, i: usize| self.scores[(n * DIRECTIONS + k % DIRECTIONS) * steps + i];
+                        let (p, q) = (at(k, i), at(k + turn, j as usize));
+                        let s = 0.5 * p.min(q) + 0.25 * (p + q);
+                        if s > top.0 {
+                            top = (s, k);
+                        }
+                    }
+                    best.push((top.0, n, i, top.1));
+                }
+            }
+            best.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+            let mut kept: Vec<(usize, usize)> = Vec::new();
+            for &(score, n, i, k) in best.iter().take(400) {
+                let near = |(m, l): &(usize, usize)| {
+                    i.abs_diff(*l) <= 1
+                        && self.normals[n].column(2).dot(&self.normals[*m].column(2)).clamp(-1.0, 1.0).acos() < 0.2
+                };
+                if kept.iter().any(near) {
+                    continue;
+                }
+                kept.push((n, i));
+                let gamma = angle.to_radians();
+                let d = 0.5 * (std::f64::consts::FRAC_PI_2 - gamma);
+                let roll = k as f64 * step_angle.to_radians() + d;
+                let rotation = self.normals[n] * Rotation3::new(Vector3::new(0.0, 0.0, roll)).into_inner();
+                let depth = self.base * f64::from(self.power_of_step[i]) * a * gamma.sin();
+                found.push(Candidate { score: f64::from(score), rotation, depth, angle: gamma });
+                if kept.len() >= per_angle {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Score of one hypothesis on the unblurred spectra.
+pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) -> f64 {
+    let d = 0.5 * (std::f64::consts::FRAC_PI_2 - c.angle);
+    let (sd, cd) = d.sin_cos();
+    let det = cd * cd - sd * sd;
+    let sides = scope.sides;
+    let dual = [[cd / det / sides[0], -sd / det / sides[0]], [-sd / det / sides[1], cd / det / sides[1]]];
+    let mut sum = [0.0f64; 2];
+    let mut count = [0.0f64; 2];
+    let n = SIZE as f64;
+    for (t, site) in bank.sites.iter().enumerate() {
+        let Some(g) = gradient(&c.rotation, site) else { continue };
+        let power = bank.tile(t);
+        for f in 0..2 {
+            let k = |i: usize| (dual[f][0] * g[0][i] + dual[f][1] * g[1][i]) * c.depth * scale;
+            let (mut x, mut y) = (k(0), k(1));
+            if x < 0.0 {
+                (x, y) = (-x, -y);
+            }
+            let len = x.hypot(y);
+            if len * (bank.length as f64) < 0.4 {
+                continue;
+            }
+            for h in 1..=6 {
+                let h = f64::from(h);
+                if h * len > HIGHEST {
+                    break;
+                }
+                if h * len * (bank.length as f64) < 2.2 {
+                    continue;
+                }
+                let (px, py) = (h * x * n, h * y * n + n / 2.0);
+                let (ix, iy) = (px as usize, py as usize);
+                if ix + 1 >= COLUMNS || iy + 1 >= SIZE {
+                    continue;
+                }
+                let (fx, fy) = ((px - ix as f64) as f32, (py - iy as f64) as f32);
+                let a = &power[ix * SIZE + iy..][..2];
+                let b = &power[(ix + 1) * SIZE + iy..][..2];
+                let p = (1.0 - fx) * (a[0] + fy * (a[1] - a[0])) + fx * (b[0] + fy * (b[1] - b[0]));
+                sum[f] += f64::from(p.min(12.0)) - 1.0;
+                count[f] += 1.0;
+            }
+        }
+    }
+    if count[0] < 4.0 || count[1] < 4.0 {
+        return -9.0;
+    }
+    let (a, b) = (sum[0] / count[0].sqrt(), sum[1] / count[1].sqrt());
+    let prior = if scope.angle_sigma > 0.0 { (c.angle - scope.angle) / (1.2 * scope.angle_sigma) } else { 0.0 };
+    0.5 * a.min(b) + 0.25 * (a + b) - 0.5 * prior * prior
+}
+
+/// Coordinate ascent on rotation, depth and crossing angle.
+pub(crate) fn refine(bank: &Bank, scale: f64, scope: &Scope, start: &Candidate) -> Candidate {
+    let mut best = *start;
+    best.score = fine_score(bank, scale, scope, &best);
+    let mut step = [0.06, 0.06, 0.03, 0.03, 0.07];
+    for _ in 0..6 {
+        for p in 0..5 {
+            if p == 4 && scope.angle_sigma <= 0.0 {
+                continue;
+            }
+            for sign in [1.0, -1.0] {
+                for _ in 0..20 {
+                    let mut next = best;
+                    let s = sign * step[p];
+                    if p < 3 {
+                        let mut w = Vector3::zeros();
+                        w[p] = s;
+                        next.rotation = Rotation3::new(w).into_inner() * best.rotation;
+                    } else if p == 3 {
+                        next.depth *= s.exp();
+                    } else {
+                        next.angle += s;
+                    }
+                    if next.rotation[(2, 2)] < 0.2 || !(0.3..=2.84).contains(&next.angle) {
+                        break;
+                    }
+                    next.score = fine_score(bank, scale, scope, &next);
+                    if next.score > best.score + 1e-9 {
+                        best = next;
+                    } else {
+                        break;
+                    }
+                }
+            }
+        }
+        step.iter_mut().for_each(|s| *s *= 0.6);
+    }
+    best
+}
+
+/// Sorts by score and drops near copies.
+pub(crate) fn distinct(found: &mut Vec<Candidate>) {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Candidate> = Vec::new();
+    for c in found.iter() {
+        let same = |k: &Candidate| {
+            (c.depth / k.depth).ln().abs() < 0.03
+                && c.rotation.column(2).dot(&k.rotation.column(2)).clamp(-1.0, 1.0).acos() < 0.06
+                && (c.angle - k.angle).abs() < 0.05
+                && c.rotation.column(0).dot(&k.rotation.column(0)).abs() > 0.98
+        };
+        if !kept.iter().any(same) {
+            kept.push(*c);
+        }
+    }
+    *found = kept;
+}
+
+impl std::fmt::Debug for Search {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Search over {} normals", self.normals.len())
+    }
+}

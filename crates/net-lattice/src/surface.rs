@@ -1,0 +1,417 @@
+//! The sheet: state, and the map from a ray to lattice coordinates.
+//!
+//! Tangent frame at the optical axis: columns `e1, e2, n` of `rotation`, touching the sheet at `(0, 0, depth)`. Above the tangent plane
+//! the sheet rises by a polynomial `h(X, Y)` without constant and linear part, so depth and normal *are* the answer on the axis. The two
+//! families of twine cross at `angle` on the axis, symmetric about `e1 + e2`: with `d = (pi/2 - angle) / 2` they run along
+//! `(cos d, sin d)` and `(sin d, cos d)`. Twine does not stretch: lattice coordinates are arc lengths (a Chebyshev net), to second order in the slope.
+
+use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::config::Config;
+
+/// Number of parameters of the fullest model: rotation 3, log depth, offsets 2, crossing angle, height 12, thread bending 2.
+pub(crate) const PARAMETERS: usize = 21;
+/// A step, or a prior's standard deviations, in that order.
+pub(crate) type Params = [f64; PARAMETERS];
+
+/// Exponents of the height polynomial's terms; the pure squares carry a factor 1/2, so that they are curvatures.
+pub(crate) const TERMS: [(i32, i32); 12] =
+    [(2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4)];
+
+/// A hung net: where its tangent plane is, how its lattice lies in it, how it bends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Columns: tangent axes `e1`, `e2` and unit normal (positive z), in the camera frame.
+    pub(crate) rotation: Matrix3<f64>,
+    /// Depth on the optical axis, m.
+    pub(crate) depth: f64,
+    /// Lattice coordinates where the optical axis meets the sheet, cells.
+    pub(crate) offset: [f64; 2],
+    /// Angle from the first family of twine to the second, rad.
+    pub(crate) angle: f64,
+    /// Height coefficients in the order of [`TERMS`], metres to the matching power.
+    pub(crate) height: [f64; 12],
+    /// Curvature of the twines within the sheet, 1/m.
+    pub(crate) bending: [f64; 2],
+    /// Side lengths along the two families, m.
+    pub(crate) sides: [f64; 2],
+}
+
+impl Surface {
+    /// A flat sheet whose nodes are at whole coordinates on the axis.
+    pub(crate) fn flat(rotation: Matrix3<f64>, depth: f64, angle: f64, sides: [f64; 2]) -> Self {
+        Self { rotation, depth, offset: [0.0; 2], angle, height: [0.0; 12], bending: [0.0; 2], sides }
+    }
+
+    /// Unit normal of the tangent plane at the optical axis, camera frame.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.rotation.column(2).into_owned()
+    }
+
+    /// Depth on the optical axis, m.
+    pub fn range(&self) -> f64 {
+        self.depth
+    }
+
+    /// The state after a step `d`: rotation from the left, depth in its logarithm, the rest added.
+    pub(crate) fn stepped(&self, d: &Params) -> Self {
+        let mut next = *self;
+        let w = Vector3::new(d[0], d[1], d[2]);
+        if w != Vector3::zeros() {
+            next.rotation = Rotation3::new(w).into_inner() * self.rotation;
+        }
+        next.depth *= d[3].exp();
+        next.offset[0] += d[4];
+        next.offset[1] += d[5];
+        next.angle += d[6];
+        for (c, d) in next.height.iter_mut().zip(&d[7..19]) {
+            *c += d;
+        }
+        next.bending[0] += d[19];
+        next.bending[1] += d[20];
+        next
+    }
+
+    /// The state with all parameters from `count` on at their prior mean.
+    pub(crate) fn truncated(&self, count: usize, nominal_angle: f64) -> Self {
+        let mut cut = *self;
+        for k in 0..12 {
+            if 7 + k >= count {
+                cut.height[k] = 0.0;
+            }
+        }
+        if count < PARAMETERS {
+            cut.bending = [0.0; 2];
+        }
+        if count < 7 {
+            cut.angle = nominal_angle;
+        }
+        cut
+    }
+
+    /// The parameters that have a prior, as deviations from its mean, in the order of a step.
+    pub(crate) fn deviation(&self, nominal_angle: f64) -> Params {
+        let mut p = [0.0; PARAMETERS];
+        p[6] = self.angle - nominal_angle;
+        p[7..19].copy_from_slice(&self.height);
+        p[19..21].copy_from_slice(&self.bending);
+        p
+    }
+
+    /// The same picture at another depth: everything grows with it.
+    pub(crate) fn scaled(&self, m: f64) -> Self {
+        let mut s = *self;
+        s.depth *= m;
+        for (c, (i, j)) in s.height.iter_mut().zip(TERMS) {
+            *c /= m.powi(i + j - 1);
+        }
+        s.bending[0] /= m;
+        s.bending[1] /= m;
+        s
+    }
+
+    /// The same sheet from a camera that moved: `new = turn * old + shift` maps camera coordinates. Touches the sheet where the new axis
+    /// meets it; lattice coordinates go on counting. Exact for a plane, to first order in the slope for the bend. `None` if the axis misses.
+    pub(crate) fn seen_from(&self, turn: &Matrix3<f64>, shift: &Vector3<f64>) -> Option<Self> {
+        let chart = self.chart();
+        let direction = turn.transpose() * Vector3::z();
+        let start = -(turn.transpose() * shift) - Vector3::new(0.0, 0.0, self.depth);
+        let local = |v: &Vector3<f64>| self.rotation.transpose() * v;
+        let (o, d) = (local(&start), local(&direction));
+        if d.z < 0.05 {
+            return None;
+        }
+        let mut depth = -o.z / d.z;
+        for _ in 0..6 {
+            let p = o + d * depth;
+            let (h, hx, hy) = chart.height(p.x, p.y);
+            let slope = d.z - hx * d.x - hy * d.y;
+            if slope < 0.25 * d.z {
+                return None;
+            }
+            depth -= (p.z - h) / slope;
+        }
+        if !(depth.is_finite() && depth > 0.0) {
+            return None;
+        }
+        let p = o + d * depth;
+        let (_, hx, hy) = chart.height(p.x, p.y);
+        let normal = Vector3::new(-hx, -hy, 1.0).normalize();
+        let e1 = (Vector3::x() - normal * normal.x).normalize();
+        let frame = Matrix3::from_columns(&[e1, normal.cross(&e1), normal]);
+        let mut moved = *self;
+        moved.rotation = turn * self.rotation * frame;
+        moved.depth = depth;
+        moved.offset = chart.lattice(p.x, p.y);
+        moved.height = self.height_about(p.x, p.y);
+        (moved.rotation[(2, 2)] > 0.1).then_some(moved)
+    }
+
+    /// Height coefficients about another point of the tangent plane, without the constant and the linear part.
+    fn height_about(&self, x: f64, y: f64) -> [f64; 12] {
+        let choose = |n: i32, k: i32| (0..k).fold(1.0, |c, i| c * f64::from(n - i) / f64::from(i + 1));
+        let half = |i: i32, j: i32| if i == 2 && j == 0 || i == 0 && j == 2 { 0.5 } else { 1.0 };
+        std::array::from_fn(|t| {
+            let (k, l) = TERMS[t];
+            let mut sum = 0.0;
+            for ((i, j), c) in TERMS.into_iter().zip(self.height) {
+                if i >= k && j >= l {
+                    sum += c * half(i, j) * choose(i, k) * choose(j, l) * x.powi(i - k) * y.powi(j - l);
+                }
+            }
+            sum / half(k, l)
+        })
+    }
+
+    /// Everything about the sheet that does not change from ray to ray.
+    pub(crate) fn chart(&self) -> Chart {
+        let r = &self.rotation;
+        let d = 0.5 * (std::f64::consts::FRAC_PI_2 - self.angle);
+        let (sd, cd) = d.sin_cos();
+        Chart {
+            e1: [r[(0, 0)], r[(1, 0)], r[(2, 0)]],
+            e2: [r[(0, 1)], r[(1, 1)], r[(2, 1)]],
+            n: [r[(0, 2)], r[(1, 2)], r[(2, 2)]],
+            z: self.depth,
+            cd,
+            sd,
+            det: cd * cd - sd * sd,
+            height: self.height,
+            bending: self.bending,
+            bent: self.height.iter().any(|c| *c != 0.0),
+            per_side: [1.0 / self.sides[0], 1.0 / self.sides[1]],
+            offset: self.offset,
+            far: 240.0 * self.sides[0].max(self.sides[1]),
+        }
+    }
+}
+
+/// Standard deviations of the prior, infinite where there is none. Zero fixes a parameter.
+pub(crate) fn prior(config: &Config) -> Params {
+    // (2n-1)!! and n! for n = 0..4
+    let double = |n: i32| [1.0, 1.0, 3.0, 15.0, 105.0][n.clamp(0, 4) as usize];
+    let factorial = |n: i32| [1.0, 1.0, 2.0, 6.0, 24.0][n.clamp(0, 4) as usize];
+    let mut p = [f64::INFINITY; PARAMETERS];
+    p[6] = config.crossing_angle_sigma_deg.to_radians();
+    for (k, (i, j)) in TERMS.into_iter().enumerate() {
+        let sd = config.height_sigma_m * f64::sqrt(double(i) * double(j))
+            / (config.height_length_m.powi(i + j) * factorial(i) * factorial(j));
+        p[7 + k] = if k == 0 || k == 2 { 2.0 * sd } else { sd };
+    }
+    p[19] = config.thread_bending_sigma_per_m;
+    p[20] = config.thread_bending_sigma_per_m;
+    p
+}
+
+/// A [`Surface`] prepared for many rays.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Chart {
+    e1: [f64; 3],
+    e2: [f64; 3],
+    n: [f64; 3],
+    z: f64,
+    cd: f64,
+    sd: f64,
+    det: f64,
+    height: [f64; 12],
+    bending: [f64; 2],
+    bent: bool,
+    per_side: [f64; 2],
+    offset: [f64; 2],
+    far: f64,
+}
+
+/// Lattice coordinates, cells, and depth, m, of the sheet along a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Point {
+    pub s: [f64; 2],
+    pub depth: f64,
+}
+
+impl Chart {
+    /// Height and its gradient at `(x, y)` of the tangent plane.
+    #[inline]
+    fn height(&self, x: f64, y: f64) -> (f64, f64, f64) {
+        let c = &self.height;
+        let (x2, y2, xy) = (x * x, y * y, x * y);
+        let h = 0.5 * c[0] * x2
+            + c[1] * xy
+            + 0.5 * c[2] * y2
+            + x2 * (c[3] * x + c[4] * y)
+            + y2 * (c[5] * x + c[6] * y)
+            + x2 * (c[7] * x2 + c[8] * xy + c[9] * y2)
+            + y2 * (c[10] * xy + c[11] * y2);
+        let (hx, hy) = self.slope(x, y);
+        (h, hx, hy)
+    }
+
+    #[inline]
+    fn slope(&self, x: f64, y: f64) -> (f64, f64) {
+        let c = &self.height;
+        let (x2, y2, xy) = (x * x, y * y, x * y);
+        let hx = c[0] * x
+            + c[1] * y
+            + 3.0 * c[3] * x2
+            + 2.0 * c[4] * xy
+            + c[5] * y2
+            + 4.0 * c[7] * x2 * x
+            + 3.0 * c[8] * x2 * y
+            + 2.0 * c[9] * x * y2
+            + c[10] * y2 * y;
+        let hy = c[1] * x
+            + c[2] * y
+            + c[4] * x2
+            + 2.0 * c[5] * xy
+            + 3.0 * c[6] * y2
+            + c[8] * x2 * x
+            + 2.0 * c[9] * x2 * y
+            + 3.0 * c[10] * x * y2
+            + 4.0 * c[11] * y2 * y;
+        (hx, hy)
+    }
+
+    /// Where the ray `(x, y, 1)` meets the sheet. `None` where it is edge-on, behind or too far to be resolved.
+    #[inline]
+    pub(crate) fn at(&self, x: f64, y: f64) -> Option<Point> {
+        let nd = self.n[0] * x + self.n[1] * y + self.n[2];
+        if nd < 0.06 {
+            return None;
+        }
+        let znz = self.z * self.n[2];
+        let mut depth = znz / nd;
+        if depth > self.far {
+            return None;
+        }
+        let a1 = self.e1[0] * x + self.e1[1] * y + self.e1[2];
+        let a2 = self.e2[0] * x + self.e2[1] * y + self.e2[2];
+        let (b1, b2) = (self.e1[2] * self.z, self.e2[2] * self.z);
+        if self.bent {
+            for _ in 0..4 {
+                let (h, hx, hy) = self.height(a1 * depth - b1, a2 * depth - b2);
+                let slope = nd - hx * a1 - hy * a2;
+                // The sheet turns edge-on.
+                if slope < 0.25 * nd {
+                    return None;
+                }
+                let step = (depth * nd - znz - h) / slope;
+                depth -= step.clamp(-0.3 * depth, 0.3 * depth);
+                if step.abs() < 1e-9 * depth {
+                    break;
+                }
+            }
+            if !(depth < self.far && depth > 0.05 * self.z) {
+                return None;
+            }
+        }
+        Some(Point { s: self.lattice(a1 * depth - b1, a2 * depth - b2), depth })
+    }
+
+    /// Lattice coordinates of the point above `(x, y)` of the tangent plane.
+    #[inline]
+    fn lattice(&self, x: f64, y: f64) -> [f64; 2] {
+        let (cd, sd, per_det) = (self.cd, self.sd, 1.0 / self.det);
+        let s1 = (cd * x - sd * y) * per_det;
+        let s2 = (cd * y - sd * x) * per_det;
+        let mut w1 = 0.5 * self.bending[0] * s2 * s2;
+        let mut w2 = 0.5 * self.bending[1] * s1 * s1;
+        if self.bent {
+            // Inextensible twine: the sheet is drawn in by half the squared slope along each twine, integrated from the axis (3-point Gauss).
+            const GAUSS: [(f64, f64); 3] =
+                [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+            for (t, weight) in GAUSS {
+                let (p, q) = (t * s1, s2);
+                let (hx, hy) = self.slope(cd * p + sd * q, sd * p + cd * q);
+                let e = cd * hx + sd * hy;
+                w1 -= 0.5 * s1 * weight * e * e;
+                let (p, q) = (s1, t * s2);
+                let (hx, hy) = self.slope(cd * p + sd * q, sd * p + cd * q);
+                let e = sd * hx + cd * hy;
+                w2 -= 0.5 * s2 * weight * e * e;
+            }
+        }
+        let x = x - (cd * w1 - sd * w2) * per_det;
+        let y = y - (cd * w2 - sd * w1) * per_det;
+        [
+            (cd * x - sd * y) * per_det * self.per_side[0] + self.offset[0],
+            (cd * y - sd * x) * per_det * self.per_side[1] + self.offset[1],
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bent() -> Surface {
+        let rotation =
+            Rotation3::new(Vector3::new(0.3, -0.2, 0.0)) * Rotation3::from_axis_angle(&Vector3::z_axis(), 0.2);
+        let mut s = Surface::flat(rotation.into_inner(), 0.8, 80f64.to_radians(), [0.05, 0.05]);
+        s.offset = [0.3, -0.2];
+        s.height[0] = 0.3;
+        s.height[1] = -0.1;
+        s.height[4] = 0.2;
+        s.height[9] = -0.3;
+        s.bending = [0.1, -0.05];
+        s
+    }
+
+    #[test]
+    fn a_flat_sheet_is_its_plane() {
+        let s = Surface { height: [0.0; 12], bending: [0.0; 2], ..bent() };
+        let p = s.chart().at(0.2, -0.1).expect("in view");
+        let ray = Vector3::new(0.2, -0.1, 1.0);
+        let n = s.normal();
+        let depth = n.z * s.depth / n.dot(&ray);
+        // closed form: rounding only
+        assert!((p.depth - depth).abs() < 1e-12);
+        let d = ray * depth - Vector3::new(0.0, 0.0, s.depth);
+        let half = 0.5 * (std::f64::consts::FRAC_PI_2 - s.angle);
+        let (e1, e2) = (s.rotation.column(0), s.rotation.column(1));
+        let a1 = (e1 * half.cos() + e2 * half.sin()) * 0.05;
+        let a2 = (e1 * half.sin() + e2 * half.cos()) * 0.05;
+        let back = a1 * (p.s[0] - s.offset[0]) + a2 * (p.s[1] - s.offset[1]);
+        assert!((back - d).norm() < 1e-12, "{back} {d}");
+    }
+
+    #[test]
+    fn rays_meet_the_bent_sheet_and_twine_keeps_its_length() {
+        let s = bent();
+        let chart = s.chart();
+        let space = |x: f64, y: f64| Vector3::new(x, y, 1.0) * chart.at(x, y).expect("in view").depth;
+        for (x, y) in [(0.0, 0.0), (0.3, 0.2), (-0.3, 0.25)] {
+            let local = s.rotation.transpose() * (space(x, y) - Vector3::new(0.0, 0.0, s.depth));
+            // Newton stops at 1e-9 of the depth
+            assert!((local.z - chart.height(local.x, local.y).0).abs() < 1e-8);
+            // Length of a step along each family, in cells against metres, with coordinates inverted numerically.
+            let h = 1e-5;
+            let at = |x, y| chart.at(x, y).expect("in view").s;
+            let (p, px, py) = (at(x, y), at(x + h, y), at(x, y + h));
+            let j = net_geometry::nalgebra::Matrix2::new(px[0] - p[0], py[0] - p[0], px[1] - p[1], py[1] - p[1]) / h;
+            let inverse = j.try_inverse().expect("regular");
+            for f in 0..2 {
+                let step = inverse.column(f) * h;
+                let length = (space(x + step[0], y + step[1]) - space(x, y)).norm() / (h * 0.05);
+                // inextensible to second order in the slope: slopes here reach 0.15, what is left is their fourth power and threads bent by 0.1 / m over 0.3 m
+                assert!((length - 1.0).abs() < 4e-3, "family {f} at {x} {y}: {length}");
+            }
+        }
+    }
+
+    #[test]
+    fn moving_the_camera_keeps_the_lattice() {
+        let s = bent();
+        let turn = Rotation3::new(Vector3::new(0.02, -0.03, 0.05)).into_inner();
+        let shift = Vector3::new(0.03, -0.02, 0.04);
+        let moved = s.seen_from(&turn, &shift).expect("in view");
+        for (x, y) in [(0.0, 0.0), (0.2, -0.15), (-0.25, 0.2)] {
+            let p = s.chart().at(x, y).expect("in view");
+            let q = turn * (Vector3::new(x, y, 1.0) * p.depth) + shift;
+            let r = moved.chart().at(q.x / q.z, q.y / q.z).expect("in view");
+            // the bend is carried to first order in the slope (0.02 here): a few hundredths of a cell at the rim, far below half a cell
+            let e = (r.s[0] - p.s[0]).hypot(r.s[1] - p.s[1]);
+            assert!(e < 0.05 && (r.depth - q.z).abs() < 2e-3, "{x} {y}: {e} cells, depth {} {}", r.depth, q.z);
+        }
+        let still = s.seen_from(&Matrix3::identity(), &Vector3::zeros()).expect("in view");
+        assert!((still.depth - s.depth).abs() < 1e-9 && (still.rotation - s.rotation).norm() < 1e-9);
+    }
+}
