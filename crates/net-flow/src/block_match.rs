@@ -157,7 +157,7 @@ impl Matcher {
         let mut at = expected;
         for level in (0..=reach.level).rev() {
             let radius = if level == reach.level { reach.radius } else { self.config.fine_search_px };
-            match self.match_level(prev, next, level, point, at, &inverse, radius) {
+            match self.match_level(prev, next, level, point, at, &inverse, radius, self.config.refine_iterations > 0) {
                 Some((pixel, score)) => {
                     at = pixel;
                     found.score = score;
@@ -170,13 +170,6 @@ impl Matcher {
                 }
             }
         }
-        if self.config.refine_iterations > 0 {
-            let half = self.config.half_window(0);
-            let iterations = self.config.refine_iterations;
-            let refined =
-                next.level(0).and_then(|view| self.refine.align(self.zncc.exact(), half, view, at, iterations));
-            at = refined.unwrap_or(at);
-        }
         found.pixel = at;
         if !inside(next, at) {
             return found;
@@ -185,7 +178,9 @@ impl Matcher {
             found.state = MatchState::Weak;
             return found;
         }
-        let back = self.match_level(next, prev, 0, at, point, &stretch, self.config.fine_search_px);
+        // The way back asks whether it leads here, not how exactly: it needs no stretch.
+        let still = Matrix2::identity();
+        let back = self.match_level(next, prev, 0, at, point, &still, self.config.fine_search_px, false);
         found.round_trip_px = back.map_or(f64::INFINITY, |(pixel, _)| (pixel - point).norm());
         let returned = found.round_trip_px <= self.config.max_round_trip_px;
         found.state = if returned { MatchState::Found } else { MatchState::NotReturned };
@@ -202,6 +197,7 @@ impl Matcher {
         expected: Vector2<f64>,
         from_template: &Matrix2<f64>,
         radius: usize,
+        refine: bool,
     ) -> Option<(Vector2<f64>, f32)> {
         let scale = f64::from(1u32 << level);
         let (from, to) = (from.level(level)?, to.level(level)?);
@@ -219,7 +215,10 @@ impl Matcher {
                 centre += peak.shift;
                 continue;
             }
-            return Some(((centre + peak.shift) * scale, peak.score));
+            // Refined where it counts: on the way there, at full size.
+            let refined = (refine && level == 0).then(|| self.refine.align(&self.zncc, self.config.refine_iterations));
+            let shift = refined.flatten().unwrap_or(peak.shift);
+            return Some(((centre + shift) * scale, peak.score));
         }
     }
 
@@ -252,27 +251,26 @@ impl Matcher {
         Some(self.zncc.scores())
     }
 
-    /// Score of the best shift within `radius` px of `expected` at full size; `None` outside the picture or where nothing shows.
-    pub(crate) fn score_at(
-        &mut self,
-        prev: &Pyramid,
-        next: &Pyramid,
-        point: Vector2<f64>,
-        expected: Vector2<f64>,
-        next_from_prev: &Matrix2<f64>,
-        radius: usize,
-    ) -> Option<f32> {
+    /// Cuts the template of `point` at full size for [`Matcher::score_at`]; false outside the picture or where nothing shows.
+    pub(crate) fn hold(&mut self, prev: &Pyramid, point: Vector2<f64>, next_from_prev: &Matrix2<f64>) -> bool {
         let stretch = usable_stretch(next_from_prev, self.config.half_window_px);
-        let margin = self.config.half_window_px as f64;
-        if !(inside(prev, point) && well_inside(next, expected, margin)) {
-            return None;
-        }
-        let (prev, next) = (prev.level(0)?, next.level(0)?);
-        if !self.zncc.cut(prev, point, &stretch.try_inverse()?, self.config.half_window(0)) {
-            return None;
-        }
+        let (Some(view), Some(inverse)) = (prev.level(0), stretch.try_inverse()) else { return false };
+        inside(prev, point) && self.zncc.cut(view, point, &inverse, self.config.half_window(0))
+    }
+
+    /// Score of the held template at the best shift within a pixel of `expected`, or of that one's neighbour; `None` where the template would leave the
+    /// picture.
+    pub(crate) fn score_at(&mut self, next: &Pyramid, expected: Vector2<f64>) -> Option<f32> {
+        let view = next.level(0).filter(|_| well_inside(next, expected, self.config.half_window_px as f64))?;
         let centre = expected.map(f64::round);
-        self.zncc.search(next, (centre.x as i64, centre.y as i64), radius);
+        self.zncc.search(view, (centre.x as i64, centre.y as i64), 1);
+        let peak = self.zncc.peak();
+        if !peak.on_border {
+            return Some(peak.score);
+        }
+        // One step of a hill climb costs less than a larger search for all.
+        let centre = centre + peak.shift;
+        self.zncc.search(view, (centre.x as i64, centre.y as i64), 1);
         Some(self.zncc.peak().score)
     }
 }
@@ -325,10 +323,10 @@ pub(crate) fn well_inside(pyramid: &Pyramid, pixel: Vector2<f64>, margin: f64) -
     pixel.x >= margin && pixel.y >= margin && pixel.x <= w && pixel.y <= h
 }
 
-/// The stretch of a template, or none where it matters by less than a tenth of a pixel at the template's edge, or is absurd.
+/// The stretch of a template, or none where it matters by less than a fifth of a pixel at the template's edge, or is absurd.
 fn usable_stretch(next_from_prev: &Matrix2<f64>, half: usize) -> Matrix2<f64> {
     let change = (next_from_prev - Matrix2::identity()).norm();
-    let matters = change * half as f64 > 0.1;
+    let matters = change * half as f64 > 0.2;
     let sane = change < 0.8 && next_from_prev.determinant() > 0.1;
     if matters && sane { *next_from_prev } else { Matrix2::identity() }
 }

@@ -144,12 +144,12 @@ pub struct Config {
     pub consensus: ConsensusConfig,
     /// How positions come about. Default key frame.
     pub mode: Mode,
-    /// Side of the squares that each hold a point, px, 8 to 1000. Default 36: 300 points at 848 x 480. Smaller is steadier and slower.
+    /// Side of the squares that each hold a point, px, 8 to 1000. Default 40: about 300 points at 848 x 480. Smaller is steadier and slower.
     pub seed_spacing_px: f64,
     /// The light's slow changes over the picture (shading, backscatter, vignette) stay with the camera and would hold points back: the mean over
     /// squares of twice this and one pixels is taken away first. Default 20 px; 0 leaves the picture as it is.
     pub flatten_radius_px: usize,
-    /// Most points that vote for the common shift and for or against rival shifts, 16 to 10000. Default 96.
+    /// Most points that vote for the common shift and for or against rival shifts, 16 to 10000. Default 64.
     pub vote_points: usize,
     /// Share of the points in view that must agree, 0 to 1, else the frame is lost. Default 0.3: fish may cover two thirds.
     pub min_agreed: f64,
@@ -158,7 +158,7 @@ pub struct Config {
     pub min_coverage: f64,
     /// Frames that a point may be carried along by the others without being seen itself. Default 50.
     pub max_carried_frames: u32,
-    /// Search radius of the match with the key frame, px of the full picture, 1 to 24. Default 3. Must stay below half a cell.
+    /// Search radius of the match with the key frame, px of the full picture, 1 to 24. Default 2. Must stay below half a cell.
     pub direct_search_px: usize,
     /// A new key frame when fewer than this share of the points agree with the old one, 0 to 1. Default 0.4.
     pub min_key_share: f64,
@@ -176,13 +176,13 @@ impl Default for Config {
             matching: MatchConfig::default(),
             consensus: ConsensusConfig::default(),
             mode: Mode::KeyFrame,
-            seed_spacing_px: 36.0,
+            seed_spacing_px: 40.0,
             flatten_radius_px: 20,
-            vote_points: 96,
+            vote_points: 64,
             min_agreed: 0.3,
             min_coverage: 0.4,
             max_carried_frames: 50,
-            direct_search_px: 3,
+            direct_search_px: 2,
             min_key_share: 0.4,
             max_step_px: None,
             min_log_odds: 12.5,

@@ -30,8 +30,9 @@ impl Flatten {
         for (v, source) in view.rows().enumerate() {
             let mean = self.mean.row(v);
             for ((out, &x), &m) in self.flat.row_mut(v).iter_mut().zip(source).zip(mean) {
-                // A cast saturates: contrasts of more than 127 levels are cut off.
-                *out = (f32::from(x) - m + 128.5) as u8;
+                // Contrasts of more than 127 levels are cut off. Adding 2^23 leaves the rounded number in the low bits.
+                let value = (f32::from(x) - m + 128.0).clamp(0.0, 255.0) + 8_388_608.0;
+                *out = value.to_bits() as u8;
             }
         }
         self.flat.view().unwrap_or(view)

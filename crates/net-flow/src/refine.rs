@@ -1,103 +1,118 @@
 //! Stage 2b: the last hundredths of a pixel, by Gauss-Newton on the template's own gradient.
 //!
 //! A quadratic through nine scores is pulled towards whole pixels by some hundredths, always the same way for the same fraction; summed
-//! over a hundred frames that counts. Inverse-compositional alignment (Baker and Matthews 2004) with gain and offset of the light
-//! eliminated starts from there and has no such pull.
+//! over a hundred frames that counts. Inverse-compositional alignment (Baker and Matthews 2004) has no such pull. Offset and gain of the
+//! light are eliminated by taking the mean and the template itself out of the gradient. Bilinear sampling is linear in the picture, so that the
+//! gradient's products with the window at the nine whole shifts round the peak are all that the iteration needs.
 
 use nalgebra::{Matrix2, Vector2};
-use net_image::GrayView;
+use wide::i16x8;
 
-use crate::zncc::{sample_patch, sum_of};
+use crate::zncc::{LANES, Zncc, push_rounded, sum_of};
 
-/// Farther than this from the start it has run away, px: the quadratic is never that wrong.
-const MAX_WALK_PX: f64 = 0.75;
 /// Steps below this change nothing, px.
 const SMALL_STEP_PX: f64 = 0.002;
 
 /// Buffers of the alignment.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Refine {
-    /// Patch of the next picture.
-    patch: Vec<f32>,
-    /// Gradient of the template along u and v, zero mean, zero on its rim.
-    gradient_u: Vec<f32>,
-    gradient_v: Vec<f32>,
+    /// Gradient along one axis, zero on its rim, without mean and without the template's own part.
+    gradient: Vec<f32>,
+    /// The same along u and v, as the correlation wants it.
+    lanes: [Vec<i16x8>; 2],
 }
 
 impl Refine {
-    /// Aligns `template` (rows of `2 half + 1`, zero mean) with `image` from `start` on. `None` where it does not converge.
-    pub(crate) fn align(
-        &mut self,
-        template: &[f32],
-        half: usize,
-        image: GrayView<'_>,
-        start: Vector2<f64>,
-        iterations: usize,
-    ) -> Option<Vector2<f64>> {
-        let side = 2 * half + 1;
-        if side < 5 || template.len() != side * side {
+    /// Aligns the template of `zncc` with the window of its last search; the shift from the search's centre, px. `None` where the peak lies on the border
+    /// of the search or the alignment leaves its neighbourhood.
+    pub(crate) fn align(&mut self, zncc: &Zncc, iterations: usize) -> Option<Vector2<f64>> {
+        let side = 2 * zncc.half() + 1;
+        let (u, v) = zncc.highest();
+        let last = 2 * zncc.radius();
+        if side < 5 || u == 0 || v == 0 || u == last || v == last {
             return None;
         }
-        self.set_gradient(template, side);
-        let (gu, gv) = (&self.gradient_u, &self.gradient_v);
-        let (uu, uv, vv) = (dot(gu, gu), dot(gu, gv), dot(gv, gv));
-        let inverse = Matrix2::new(uu, uv, uv, vv).map(f64::from).try_inverse()?;
-        let (ut, vt) = (dot(gu, template), dot(gv, template));
-        let mut at = start;
-        for _ in 0..iterations {
-            self.patch.clear();
-            sample_patch(image, at, &Matrix2::identity(), half, &mut self.patch);
-            let n = self.patch.len() as f32;
-            let mean = sum_of(&self.patch) / n;
-            self.patch.iter_mut().for_each(|w| *w -= mean);
-            let (tw, ww) = (dot(template, &self.patch), dot(&self.patch, &self.patch));
-            if ww <= n * 0.25 || tw <= 0.0 {
-                return None;
+        let template = zncc.exact();
+        let energy = dot(template, template);
+        let mut norms = [0.0f32; 3];
+        for axis in 0..2 {
+            self.set_gradient(template, side, if axis == 0 { 1 } else { side });
+            let own = dot(&self.gradient, template) / energy;
+            self.gradient.iter_mut().zip(template).for_each(|(g, t)| *g -= own * t);
+            self.store(axis, side);
+        }
+        let [gu, gv] = &self.lanes;
+        for (norm, (a, b)) in norms.iter_mut().zip([(gu, gu), (gu, gv), (gv, gv)]) {
+            let sum: i64 =
+                a.iter().zip(b).map(|(a, b)| a.dot(*b).to_array().into_iter().map(i64::from).sum::<i64>()).sum();
+            *norm = sum as f32;
+        }
+        let inverse = Matrix2::new(norms[0], norms[1], norms[1], norms[2]).map(f64::from).try_inverse()?;
+        let mut products = [[Vector2::zeros(); 3]; 3];
+        for (j, row) in products.iter_mut().enumerate() {
+            for (i, product) in row.iter_mut().enumerate() {
+                let along = |g: &[i16x8]| zncc.product(g, u + i - 1, v + j - 1) as f64;
+                *product = Vector2::new(along(gu), along(gv));
             }
-            let gain = tw / ww;
-            let (uw, vw) = (dot(gu, &self.patch), dot(gv, &self.patch));
-            let step = inverse * Vector2::new(f64::from(gain * uw - ut), f64::from(gain * vw - vt));
-            at -= step;
-            let walk = (at - start).norm();
-            if walk.is_nan() || walk > MAX_WALK_PX {
+        }
+        let gain = zncc.gain(u, v);
+        let mut shift = Vector2::zeros();
+        for _ in 0..iterations {
+            let step = inverse * interpolate(&products, shift) * gain;
+            shift -= step;
+            if step.iter().any(|x| x.is_nan()) || shift.amax() > 1.0 {
                 return None;
             }
             if step.amax() < SMALL_STEP_PX {
                 break;
             }
         }
-        Some(at)
+        Some(shift + Vector2::new(u as f64, v as f64) - Vector2::repeat(zncc.radius() as f64))
     }
 
     /// Central differences, zero on the rim, mean taken away inside so that an offset of the light moves nothing.
-    fn set_gradient(&mut self, template: &[f32], side: usize) {
-        for (gradient, step) in [(&mut self.gradient_u, 1), (&mut self.gradient_v, side)] {
-            gradient.clear();
-            gradient.resize(side * side, 0.0);
-            let mut total = 0.0;
-            for v in 1..side - 1 {
-                let inner = v * side + 1..(v + 1) * side - 1;
-                let after = &template[inner.start + step..inner.end + step];
-                let before = &template[inner.start - step..inner.end - step];
-                for ((g, a), b) in gradient[inner.clone()].iter_mut().zip(after).zip(before) {
-                    *g = 0.5 * (a - b);
-                }
-                total += sum_of(&gradient[inner]);
+    fn set_gradient(&mut self, template: &[f32], side: usize, step: usize) {
+        self.gradient.clear();
+        self.gradient.resize(side * side, 0.0);
+        let mut total = 0.0;
+        for v in 1..side - 1 {
+            let inner = v * side + 1..(v + 1) * side - 1;
+            let after = &template[inner.start + step..inner.end + step];
+            let before = &template[inner.start - step..inner.end - step];
+            for ((g, a), b) in self.gradient[inner.clone()].iter_mut().zip(after).zip(before) {
+                *g = 0.5 * (a - b);
             }
-            let mean = total / ((side - 2) * (side - 2)) as f32;
-            for v in 1..side - 1 {
-                gradient[v * side + 1..(v + 1) * side - 1].iter_mut().for_each(|g| *g -= mean);
-            }
+            total += sum_of(&self.gradient[inner]);
+        }
+        let mean = total / ((side - 2) * (side - 2)) as f32;
+        for v in 1..side - 1 {
+            self.gradient[v * side + 1..(v + 1) * side - 1].iter_mut().for_each(|g| *g -= mean);
+        }
+    }
+
+    /// Rounds the gradient to the template's steps, rows padded with zeros.
+    fn store(&mut self, axis: usize, side: usize) {
+        self.lanes[axis].clear();
+        for row in self.gradient.chunks_exact(side) {
+            push_rounded(row, &mut self.lanes[axis]);
         }
     }
 }
 
+/// Bilinear between the nine products; `shift` is within one pixel of the middle.
+fn interpolate(products: &[[Vector2<f64>; 3]; 3], shift: Vector2<f64>) -> Vector2<f64> {
+    let (i, j) = (usize::from(shift.x >= 0.0), usize::from(shift.y >= 0.0));
+    let (fu, fv) = (shift.x + 1.0 - i as f64, shift.y + 1.0 - j as f64);
+    let row = |j: usize| products[j][i] * (1.0 - fu) + products[j][i + 1] * fu;
+    row(j) * (1.0 - fv) + row(j + 1) * fv
+}
+
 /// Sum of products in eight lanes.
 fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
-    let mut lanes = [0.0f32; 8];
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut lanes = [0.0f32; LANES];
     for (a, b) in a.iter().zip(b) {
-        for k in 0..8 {
+        for k in 0..LANES {
             lanes[k] += a[k] * b[k];
         }
     }

@@ -13,8 +13,8 @@ use crate::consensus::median_of;
 use crate::motion::Motion;
 use crate::surface::{SurfacePeak, spread};
 
-/// Neighbourhood over which winner and rival are each given their best score, px.
-const NEIGHBOURHOOD_PX: usize = 2;
+/// Most rivals compared.
+pub(crate) const MAX_RIVALS: usize = 10;
 /// Fewer points than this compare nothing.
 const MIN_COMPARED: usize = 8;
 /// Most that the pictures can say, standard deviations: beyond it errors that all points share dominate.
@@ -92,10 +92,9 @@ pub(crate) struct Expectation {
 /// Compares the winner with its rivals. Owns its buffers.
 #[derive(Debug, Clone)]
 pub(crate) struct Rivals {
-    differences: Vec<f64>,
+    /// Per rival, the winner's score less the rival's at each compared point.
+    differences: [Vec<f64>; MAX_RIVALS],
     sorted: Vec<f64>,
-    /// The winner's score of each compared point.
-    base: Vec<Option<f32>>,
     rivals: Vec<Rival>,
 }
 
@@ -118,10 +117,9 @@ impl Rivals {
     /// Buffers to compare up to `points` points.
     pub(crate) fn new(points: usize) -> Self {
         Self {
-            differences: Vec::with_capacity(points),
+            differences: std::array::from_fn(|_| Vec::with_capacity(points)),
             sorted: Vec::with_capacity(points),
-            base: Vec::with_capacity(points),
-            rivals: Vec::with_capacity(16),
+            rivals: Vec::with_capacity(MAX_RIVALS),
         }
     }
 
@@ -143,18 +141,23 @@ impl Rivals {
             list.iter().zip(evidence.agrees).filter(|(_, a)| **a).map(|(p, _)| p).sum::<Vector2<f64>>()
         };
         let middle = sum(evidence.from) / agreed as f64;
-        self.base.clear();
-        for i in spread(evidence.from.len(), evidence.most) {
+        let count = candidates.len().min(MAX_RIVALS);
+        self.differences.iter_mut().for_each(Vec::clear);
+        for i in spread(evidence.from.len(), evidence.most).filter(|&i| evidence.agrees[i]) {
             let p = evidence.from[i];
-            self.base.push(if evidence.agrees[i] {
-                matcher.score_at(prev, next, p, winner.apply(p), &winner.jacobian(p), NEIGHBOURHOOD_PX)
-            } else {
-                None
-            });
+            if !matcher.hold(prev, p, &winner.jacobian(p)) {
+                continue;
+            }
+            let Some(base) = matcher.score_at(next, winner.apply(p)) else { continue };
+            for (k, differences) in self.differences.iter_mut().enumerate().take(count) {
+                let there = candidates.shift(k, p, winner).map(|shift| winner.apply(p) + shift);
+                if let Some(score) = there.and_then(|there| matcher.score_at(next, there)) {
+                    differences.push(f64::from(base - score));
+                }
+            }
         }
-        for k in 0..candidates.len() {
-            if let Some(rival) = self.rival(matcher, prev, next, winner, evidence, &candidates, k, middle, expectation)
-            {
+        for k in 0..count {
+            if let Some(rival) = self.rival(winner, evidence, &candidates, k, middle, expectation) {
                 self.rivals.push(rival);
             }
         }
@@ -172,11 +175,9 @@ impl Rivals {
         self.rivals.clear();
     }
 
+    /// What the differences, the points' own matches and the expectation say of rival `k`.
     fn rival(
         &mut self,
-        matcher: &mut Matcher,
-        prev: &Pyramid,
-        next: &Pyramid,
         winner: &Motion,
         evidence: &Evidence<'_>,
         candidates: &Candidates<'_>,
@@ -186,19 +187,10 @@ impl Rivals {
     ) -> Option<Rival> {
         let shift_px = candidates.shift(k, middle, winner)?;
         let cells = candidates.cells(k);
-        self.differences.clear();
-        for (slot, i) in spread(evidence.from.len(), evidence.most).enumerate() {
-            let Some(base) = self.base[slot] else { continue };
-            let p = evidence.from[i];
-            let Some(shift) = candidates.shift(k, p, winner) else { continue };
-            let there = winner.apply(p) + shift;
-            if let Some(score) = matcher.score_at(prev, next, p, there, &winner.jacobian(p), NEIGHBOURHOOD_PX) {
-                self.differences.push(f64::from(base - score));
-            }
-        }
-        let compared = self.differences.len();
-        let margin = median_of(&mut self.sorted, self.differences.iter().copied());
-        let z = standard_errors(&self.differences);
+        let differences = &self.differences[k];
+        let compared = differences.len();
+        let margin = median_of(&mut self.sorted, differences.iter().copied());
+        let z = standard_errors(differences);
         let near = |(&p, &q): (&Vector2<f64>, &Vector2<f64>)| {
             candidates.shift(k, p, winner).is_some_and(|s| (winner.apply(p) + s - q).norm() <= evidence.threshold_px)
         };

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::flatten::Flatten;
 use crate::motion::Motion;
 use crate::result::{Estimate, FlowResult, Status};
-use crate::rivals::{Candidates, Evidence, Expectation, Lattice, Rival, Rivals};
+use crate::rivals::{Candidates, Evidence, Expectation, Lattice, MAX_RIVALS, Rival, Rivals};
 use crate::surface::{Surface, SurfacePeak};
 use crate::tracks::{Track, TrackState, Tracks};
 
@@ -25,8 +25,6 @@ const SURFACE_PROMINENCE: f64 = 6.0;
 const RIVAL_PEAK_SHARE: f32 = 0.4;
 /// Peaks nearer than this are one, px of their level.
 const MAIN_LOBE_PX: f64 = 1.5;
-/// Most rivals compared.
-const MAX_RIVAL_PEAKS: usize = 16;
 
 /// What the caller knows of the coming frame. All of it is optional.
 #[derive(Debug, Clone, Copy, Default)]
@@ -96,7 +94,7 @@ struct Scratch {
 /// Rivals found on the surfaces.
 #[derive(Debug, Clone, Copy, Default)]
 struct RivalPeaks {
-    peaks: [SurfacePeak; MAX_RIVAL_PEAKS],
+    peaks: [SurfacePeak; MAX_RIVALS],
     count: usize,
 }
 
@@ -104,7 +102,7 @@ impl RivalPeaks {
     /// Adds a peak that is neither the winner's own nor, within `lobe_px`, one that is there already.
     fn add(&mut self, peak: SurfacePeak, lobe_px: f64) {
         let apart = |shift: Vector2<f64>| (peak.shift - shift).norm() > lobe_px;
-        if self.count < MAX_RIVAL_PEAKS && apart(Vector2::zeros()) && self.iter().all(|p| apart(p.shift)) {
+        if self.count < MAX_RIVALS && apart(Vector2::zeros()) && self.iter().all(|p| apart(p.shift)) {
             self.peaks[self.count] = peak;
             self.count += 1;
         }
@@ -352,7 +350,7 @@ impl FlowTracker {
             let scale = f64::from(1u32 << level);
             let radius = ((search_px / scale).ceil() as usize + 1).clamp(2, top.radius.max(12));
             let reach = Reach { level, radius };
-            let (points, most) = (&self.scratch.points, self.config.vote_points);
+            let (points, most) = (&self.scratch.points, self.config.vote_points.div_ceil(2));
             if !self.surface.sum(&mut self.matcher, &self.prev, &self.next, points, most, winner, reach) {
                 continue;
             }

@@ -13,11 +13,13 @@ pub(crate) const MAX_HALF: usize = 31;
 /// Largest search radius, px.
 pub(crate) const MAX_RADIUS: usize = 24;
 /// Lanes of one product.
-const LANES: usize = 8;
-/// Steps of the template per grey level. 255 * 16 * 255 * 63 * 63 is within `i64`; a row of it within `i32`.
+pub(crate) const LANES: usize = 8;
+/// Steps of the template per grey level.
 const STEPS: f32 = 16.0;
 /// Rounds a small f32 to a whole number when added.
 const ROUNDER: f32 = 12_582_912.0;
+/// Row length, px, of the part of the picture that a stretched template is sampled from.
+const WARP_STRIDE: usize = 128;
 /// A template of less variance, grey levels squared, shows nothing.
 const FLAT_VARIANCE: f64 = 0.5;
 
@@ -28,6 +30,8 @@ pub(crate) struct Zncc {
     template: Vec<i16x8>,
     /// The same before rounding, packed rows.
     exact: Vec<f32>,
+    /// The part of the picture that a stretched template is sampled from.
+    warp: Vec<f32>,
     /// Half width of the template, px.
     half: usize,
     /// Lanes per template row.
@@ -36,14 +40,18 @@ pub(crate) struct Zncc {
     sum: i64,
     /// Sum of squares of the rounded template about its mean.
     energy: f64,
-    /// Window rows of `stride` values.
+    /// Window rows of `stride` values, less 128.
     window: Vec<i16>,
+    /// Values from one row of the window to the next.
+    stride: usize,
     /// Column sums of the window over the template's rows.
     sums: Vec<i32>,
     /// Column sums of its squares.
     squares: Vec<i32>,
-    /// Scores, rows of `2 radius + 1`.
+    /// Scores, rows of `2 radius + 1`; covariances while they are in the making.
     scores: Vec<f32>,
+    /// Sum of squares of the window about its mean, of each shift.
+    variances: Vec<f32>,
     /// Search radius of `scores`, px.
     radius: usize,
 }
@@ -66,14 +74,17 @@ impl Zncc {
         Self {
             template: Vec::with_capacity(side * side.div_ceil(LANES)),
             exact: Vec::with_capacity(side * side),
+            warp: Vec::with_capacity((WARP_STRIDE + 1) * WARP_STRIDE),
             half: 0,
             row_lanes: 0,
             sum: 0,
             energy: 0.0,
             window: Vec::with_capacity(window * window),
+            stride: 0,
             sums: Vec::with_capacity(window),
             squares: Vec::with_capacity(window),
             scores: Vec::with_capacity((2 * MAX_RADIUS + 1).pow(2)),
+            variances: Vec::with_capacity((2 * MAX_RADIUS + 1).pow(2)),
             radius: 0,
         }
     }
@@ -91,7 +102,7 @@ impl Zncc {
         let side = 2 * half + 1;
         self.half = half;
         self.exact.clear();
-        sample_patch(image, centre, source_from_template, half, &mut self.exact);
+        sample_patch(image, centre, source_from_template, half, &mut self.warp, &mut self.exact);
         let mean = sum_of(&self.exact) / (side * side) as f32;
         self.exact.iter_mut().for_each(|x| *x -= mean);
         self.row_lanes = side.div_ceil(LANES);
@@ -99,17 +110,11 @@ impl Zncc {
         let (mut sum, mut squares) = (i32x4::ZERO, 0i64);
         let ones = i16x8::splat(1);
         for row in self.exact.chunks_exact(side) {
+            push_rounded(row, &mut self.template);
             let mut row_squares = i32x4::ZERO;
-            for chunk in row.chunks(LANES) {
-                let mut lanes = [0i16; LANES];
-                for (lane, &x) in lanes.iter_mut().zip(chunk) {
-                    // |x| <= 255: adding 1.5 * 2^23 leaves the rounded number in the low bits of the sum.
-                    *lane = (x * STEPS + ROUNDER).to_bits() as i16;
-                }
-                let lanes = i16x8::from(lanes);
+            for lanes in self.template.iter().rev().take(self.row_lanes) {
                 sum += lanes.dot(ones);
-                row_squares += lanes.dot(lanes);
-                self.template.push(lanes);
+                row_squares += lanes.dot(*lanes);
             }
             // Eight products of at most 2 * 4080^2 = 3.3e7 a lane and row.
             squares += i64::from(row_squares.reduce_add());
@@ -134,7 +139,7 @@ impl Zncc {
         let rows = side + 2 * radius;
         // The last shift still reads whole lanes.
         let stride = 2 * radius + self.row_lanes * LANES;
-        self.radius = radius;
+        (self.radius, self.stride) = (radius, stride);
         self.load_window(image, (centre.0 - reach, centre.1 - reach), rows, stride);
         self.sums.clear();
         self.sums.resize(rows, 0);
@@ -145,37 +150,53 @@ impl Zncc {
             self.add_row(v * stride, 0);
         }
         self.scores.clear();
+        self.variances.clear();
         for dv in 0..=2 * radius {
             if dv > 0 {
                 self.add_row((dv - 1) * stride, -1);
                 self.add_row((dv + side - 1) * stride, 0);
             }
             let mut sum: i32 = self.sums[..side].iter().sum();
-            // At most 63 * 63 * 255^2 = 2.6e8.
+            // At most 63 * 63 * 128^2 = 6.5e7.
             let mut squares: i32 = self.squares[..side].iter().sum();
             for du in 0..=2 * radius {
                 if du > 0 {
                     sum += self.sums[du + side - 1] - self.sums[du - 1];
                     squares += self.squares[du + side - 1] - self.squares[du - 1];
                 }
-                let product = match self.row_lanes {
-                    1 => correlate::<1>(&self.template, &self.window[dv * stride + du..], stride),
-                    2 => correlate::<2>(&self.template, &self.window[dv * stride + du..], stride),
-                    3 => correlate::<3>(&self.template, &self.window[dv * stride + du..], stride),
-                    4 => correlate::<4>(&self.template, &self.window[dv * stride + du..], stride),
-                    5 => correlate::<5>(&self.template, &self.window[dv * stride + du..], stride),
-                    6 => correlate::<6>(&self.template, &self.window[dv * stride + du..], stride),
-                    7 => correlate::<7>(&self.template, &self.window[dv * stride + du..], stride),
-                    _ => correlate::<8>(&self.template, &self.window[dv * stride + du..], stride),
-                };
+                let product = correlate(&self.template, self.row_lanes, &self.window[dv * stride + du..], stride);
                 let (sum, squares) = (f64::from(sum), f64::from(squares));
-                let variance = squares - sum * sum / n;
-                let covariance = product as f64 - self.sum as f64 * sum / n;
-                let scale = (self.energy * variance).sqrt();
-                // A flat window resembles nothing.
-                let flat = variance <= FLAT_VARIANCE * n || scale <= 0.0;
-                self.scores.push(if flat { 0.0 } else { (covariance / scale) as f32 });
+                self.scores.push((product as f64 - self.sum as f64 * sum / n) as f32);
+                self.variances.push((squares - sum * sum / n) as f32);
             }
+        }
+        // Roots and quotients of all shifts at once: the compiler takes four at a time.
+        let (scale, flat) = ((1.0 / self.energy.max(1.0).sqrt()) as f32, (FLAT_VARIANCE * n) as f32);
+        for (score, &variance) in self.scores.iter_mut().zip(&self.variances) {
+            // A flat window resembles nothing.
+            let value = *score * scale / variance.max(flat).sqrt();
+            *score = if variance > flat { value } else { 0.0 };
+        }
+    }
+
+    /// Sum of products of `template` (laid out as this one) with the window of the last search at whole shift `(u, v)`, counted from the corner.
+    pub(crate) fn product(&self, template: &[i16x8], u: usize, v: usize) -> i64 {
+        self.window.get(v * self.stride + u..).map_or(0, |w| correlate(template, self.row_lanes, w, self.stride))
+    }
+
+    /// Half width of the template, px.
+    pub(crate) fn half(&self) -> usize {
+        self.half
+    }
+
+    /// Gain of the light from the window to the template at the best shift: regression of the one on the other.
+    pub(crate) fn gain(&self, u: usize, v: usize) -> f64 {
+        let i = v * (2 * self.radius + 1) + u;
+        match (self.scores.get(i), self.variances.get(i)) {
+            (Some(&score), Some(&variance)) if variance > 0.0 => {
+                f64::from(score) * (self.energy / f64::from(variance)).sqrt()
+            }
+            _ => 0.0,
         }
     }
 
@@ -184,16 +205,28 @@ impl Zncc {
         &self.scores
     }
 
-    /// The best shift of the last search with its sub-pixel part.
-    pub(crate) fn peak(&self) -> Peak {
-        let side = 2 * self.radius + 1;
+    /// The best whole shift of the last search, counted from the corner.
+    pub(crate) fn highest(&self) -> (usize, usize) {
         let (mut best, mut at) = (f32::NEG_INFINITY, 0);
         for (i, &s) in self.scores.iter().enumerate() {
             if s > best {
                 (best, at) = (s, i);
             }
         }
-        let (u, v) = (at % side, at / side);
+        let side = 2 * self.radius + 1;
+        (at % side, at / side)
+    }
+
+    /// Search radius of the last search, px.
+    pub(crate) fn radius(&self) -> usize {
+        self.radius
+    }
+
+    /// The best shift of the last search with its sub-pixel part.
+    pub(crate) fn peak(&self) -> Peak {
+        let side = 2 * self.radius + 1;
+        let (u, v) = self.highest();
+        let best = self.scores[v * side + u];
         let whole = Vector2::new(u as f64 - self.radius as f64, v as f64 - self.radius as f64);
         if u == 0 || v == 0 || u == side - 1 || v == side - 1 {
             return Peak { shift: whole, score: best, on_border: true };
@@ -207,7 +240,7 @@ impl Zncc {
     fn add_row(&mut self, start: usize, sign: i32) {
         let row = &self.window[start..][..self.sums.len()];
         for ((s, q), &x) in self.sums.iter_mut().zip(&mut self.squares).zip(row) {
-            // 255^2 fits 16 bits, and 16-bit products are what every machine has in vector form.
+            // 128^2 fits 16 bits, and 16-bit products are what every machine has in vector form.
             let square = (x as u16).wrapping_mul(x as u16);
             *s += (i32::from(x) ^ sign) - sign;
             *q += (i32::from(square) ^ sign) - sign;
@@ -217,18 +250,29 @@ impl Zncc {
     /// Copies rows of the picture, edges repeated, zeros in the padding.
     fn load_window(&mut self, image: GrayView<'_>, corner: (i64, i64), rows: usize, stride: usize) {
         let (width, height) = (image.width() as i64, image.height() as i64);
-        self.window.clear();
-        for v in 0..rows as i64 {
-            let source = image.row((corner.1 + v).clamp(0, height - 1) as usize);
-            let inside = corner.0 >= 0 && corner.0 + rows as i64 <= width;
+        // The padding meets zeros of the template: its values do not matter.
+        self.window.resize(rows * stride + LANES, 0);
+        let inside = corner.0 >= 0 && corner.0 + rows as i64 <= width;
+        for (v, out) in (corner.1..).zip(self.window.chunks_exact_mut(stride).take(rows)) {
+            let source = image.row(v.clamp(0, height - 1) as usize);
             if inside {
-                self.window.extend(source[corner.0 as usize..][..rows].iter().map(|&x| i16::from(x)));
+                let source = &source[corner.0 as usize..][..rows];
+                out.iter_mut().zip(source).for_each(|(out, &x)| *out = i16::from(x) - 128);
             } else {
-                let at = |u: i64| i16::from(source[(corner.0 + u).clamp(0, width - 1) as usize]);
-                self.window.extend((0..rows as i64).map(at));
+                let at = |u: i64| i16::from(source[(corner.0 + u).clamp(0, width - 1) as usize]) - 128;
+                out.iter_mut().take(rows).zip(0..).for_each(|(out, u)| *out = at(u));
             }
-            self.window.extend(std::iter::repeat_n(0, stride - rows));
         }
+    }
+}
+
+/// Rounds a row of at most 63 values to steps and appends it, padded with zeros to whole lanes.
+pub(crate) fn push_rounded(row: &[f32], out: &mut Vec<i16x8>) {
+    let mut padded = [0.0f32; 2 * MAX_HALF + 2];
+    padded[..row.len()].copy_from_slice(row);
+    for chunk in padded.as_chunks::<LANES>().0.iter().take(row.len().div_ceil(LANES)) {
+        // |x| <= 255: adding 1.5 * 2^23 leaves the rounded number in the low bits of the sum.
+        out.push(i16x8::from(chunk.map(|x| (x * STEPS + ROUNDER).to_bits() as i16)));
     }
 }
 
@@ -242,25 +286,36 @@ pub(crate) fn sum_of(values: &[f32]) -> f32 {
     lanes.iter().sum::<f32>() + rest.iter().sum::<f32>()
 }
 
-/// Sum of products of a template of `N` lanes a row with the window that starts at `window[0]`.
+/// Sum of products of a template (rows of `row_lanes`) with the window that starts at `window[0]`.
 #[inline]
-fn correlate<const N: usize>(template: &[i16x8], window: &[i16], stride: usize) -> i64 {
-    let mut total = 0i64;
-    let mut sum = i32x4::ZERO;
-    for (v, row) in template.chunks_exact(N).enumerate() {
-        let source = &window[v * stride..][..N * LANES];
-        for (t, w) in row.iter().zip(source.chunks_exact(LANES)) {
-            let mut lanes = [0i16; LANES];
-            lanes.copy_from_slice(w);
-            sum += t.dot(i16x8::from(lanes));
-        }
-        // A lane gains at most 2 * 4080 * 255 = 2.1e6 per product: 16 rows of 8 products stay below 2^31.
-        if v % 16 == 15 {
-            total += i64::from(sum.reduce_add());
-            sum = i32x4::ZERO;
-        }
+pub(crate) fn correlate(template: &[i16x8], row_lanes: usize, window: &[i16], stride: usize) -> i64 {
+    match row_lanes {
+        1 => correlate_rows::<1>(template, window, stride),
+        2 => correlate_rows::<2>(template, window, stride),
+        3 => correlate_rows::<3>(template, window, stride),
+        4 => correlate_rows::<4>(template, window, stride),
+        5 => correlate_rows::<5>(template, window, stride),
+        6 => correlate_rows::<6>(template, window, stride),
+        7 => correlate_rows::<7>(template, window, stride),
+        _ => correlate_rows::<8>(template, window, stride),
     }
-    total + i64::from(sum.reduce_add())
+}
+
+/// [`correlate`] of rows of `N` lanes. A lane gains at most 2 * 4080 * 128 = 1.04e6 per product, and there are 63 * 8 products: 5.3e8.
+#[inline]
+fn correlate_rows<const N: usize>(template: &[i16x8], window: &[i16], stride: usize) -> i64 {
+    let mut sum = i32x4::ZERO;
+    let (rows, _) = template.as_chunks::<N>();
+    let mut window = window;
+    for row in rows {
+        let (lanes, _) = window.as_chunks::<LANES>();
+        let Some(lanes) = lanes.first_chunk::<N>() else { break };
+        for k in 0..N {
+            sum += row[k].dot(i16x8::from(lanes[k]));
+        }
+        window = window.get(stride..).unwrap_or_default();
+    }
+    sum.to_array().into_iter().map(i64::from).sum()
 }
 
 /// Least-squares quadratic through the nine scores `at(-1..=1, -1..=1)`: offset of its maximum, px, at most one half a pixel away
@@ -293,6 +348,7 @@ pub(crate) fn sample_patch(
     centre: Vector2<f64>,
     source_from_patch: &Matrix2<f64>,
     half: usize,
+    warp: &mut Vec<f32>,
     out: &mut Vec<f32>,
 ) {
     let reach = half as i64;
@@ -301,27 +357,75 @@ pub(crate) fn sample_patch(
     let inside = u0 - reach >= 0 && v0 - reach >= 0 && u0 + reach + 1 < width && v0 + reach + 1 < height;
     if inside && *source_from_patch == Matrix2::identity() {
         let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
-        let (a, b, c, d) = ((1.0 - fu) * (1.0 - fv), fu * (1.0 - fv), (1.0 - fu) * fv, fu * fv);
         let (start, side) = ((u0 - reach) as usize, 2 * half + 1);
         out.resize(side * side, 0.0);
-        for (v, row) in (v0 - reach..).zip(out.chunks_exact_mut(side)) {
-            let top = &image.row(v as usize)[start..][..side + 1];
-            let bottom = &image.row(v as usize + 1)[start..][..side + 1];
-            let left = top[..side].iter().zip(&bottom[..side]);
-            let right = top[1..].iter().zip(&bottom[1..]);
-            for ((out, (&tl, &bl)), (&tr, &br)) in row.iter_mut().zip(left).zip(right) {
-                *out = a * f32::from(tl) + b * f32::from(tr) + c * f32::from(bl) + d * f32::from(br);
+        // Each row is interpolated along u once, and serves the output row above it and the one below.
+        let mut rows = [[0.0f32; 2 * MAX_HALF + 2]; 2];
+        let [above, below] = &mut rows;
+        let (mut above, mut below) = (&mut above[..side], &mut below[..side]);
+        between(&image.row((v0 - reach) as usize)[start..][..side + 1], fu, above);
+        for (v, out) in (v0 - reach + 1..).zip(out.chunks_exact_mut(side)) {
+            between(&image.row(v as usize)[start..][..side + 1], fu, below);
+            for ((out, a), b) in out.iter_mut().zip(&*above).zip(&*below) {
+                *out = a + fv * (b - a);
             }
+            std::mem::swap(&mut above, &mut below);
         }
         return;
     }
     let m = source_from_patch.map(|x| x as f32);
-    let (cu, cv) = (centre.x as f32, centre.y as f32);
+    // Fractions are taken relative to a whole pixel, so that f32 is as good in the corner of a large picture as at the origin.
+    let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
+    let spread = (m.abs() * Vector2::repeat(reach as f32)).map(|x| x.ceil() as i64 + 1);
+    let inside = u0 - spread.x >= 0 && v0 - spread.y >= 0 && u0 + spread.x + 1 < width && v0 + spread.y + 1 < height;
+    let rows = (2 * spread.y + 2) as usize;
+    if inside && rows <= WARP_STRIDE && 2 * spread.x + 2 <= WARP_STRIDE as i64 {
+        // The part of the picture that takes part, in rows of fixed length: one check of bounds per sample.
+        let (left, columns) = ((u0 - spread.x) as usize, (2 * spread.x + 2) as usize);
+        warp.resize((WARP_STRIDE + 1) * WARP_STRIDE, 0.0);
+        for (v, row) in (u64::try_from(v0 - spread.y).unwrap_or(0)..).zip(warp.chunks_exact_mut(WARP_STRIDE).take(rows))
+        {
+            let source = &image.row(v as usize)[left..][..columns];
+            row.iter_mut().zip(source).for_each(|(x, &s)| *x = f32::from(s));
+        }
+        let side = 2 * half + 1;
+        out.resize(side * side, 0.0);
+        let (du, dv) = (fu + spread.x as f32, fv + spread.y as f32);
+        let mut places = [(0u32, 0.0f32, 0.0f32); 2 * MAX_HALF + 1];
+        for (v, out) in (-reach..).zip(out.chunks_exact_mut(side)) {
+            let (base_u, base_v) = (du + m.m12 * v as f32, dv + m.m22 * v as f32);
+            for (u, place) in (-reach as i32..).zip(&mut places[..side]) {
+                let u = u as f32;
+                let (u, v) = (base_u + m.m11 * u, base_v + m.m21 * u);
+                // Rounds down (or to the whole number just reached): the low bits of the sum.
+                let (iu, iv) = (u - 0.5 + ROUNDER, v - 0.5 + ROUNDER);
+                let at = (iv.to_bits() & 0xffff) * WARP_STRIDE as u32 + (iu.to_bits() & 0xffff);
+                *place = (at, u - (iu - ROUNDER), v - (iv - ROUNDER));
+            }
+            for (out, &(at, fu, fv)) in out.iter_mut().zip(&places) {
+                let Some(near) = warp.get(at as usize..).and_then(|w| w.first_chunk::<{ WARP_STRIDE + 2 }>()) else {
+                    continue;
+                };
+                let (a, b) = (near[0] + fu * (near[1] - near[0]), near[WARP_STRIDE]);
+                let b = b + fu * (near[WARP_STRIDE + 1] - b);
+                *out = a + fv * (b - a);
+            }
+        }
+        return;
+    }
     for v in -reach..=reach {
         for u in -reach..=reach {
             let (u, v) = (u as f32, v as f32);
-            out.push(bilinear(image, cu + m.m11 * u + m.m12 * v, cv + m.m21 * u + m.m22 * v));
+            out.push(bilinear(image, centre.x as f32 + m.m11 * u + m.m12 * v, centre.y as f32 + m.m21 * u + m.m22 * v));
         }
+    }
+}
+
+/// Values a fraction `f` of a pixel to the right of each of a row's; the row has one more.
+fn between(row: &[u8], f: f32, out: &mut [f32]) {
+    for ((out, &a), &b) in out.iter_mut().zip(row).zip(row.iter().skip(1)) {
+        let (a, b) = (f32::from(a), f32::from(b));
+        *out = a + f * (b - a);
     }
 }
 
