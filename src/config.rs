@@ -6,9 +6,9 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Spectra of sections, junctions of contours: Strandenes 2023.
+    /// One lattice on one bent sheet, fitted to the whole picture and followed from frame to frame.
     #[default]
-    Thesis,
+    Lattice,
 }
 
 impl std::str::FromStr for Method {
@@ -16,7 +16,7 @@ impl std::str::FromStr for Method {
 
     fn from_str(name: &str) -> Result<Self> {
         match name {
-            "thesis" => Ok(Self::Thesis),
+            "lattice" => Ok(Self::Lattice),
             _ => Err(Error::Method { name: name.to_owned() }),
         }
     }
@@ -28,14 +28,16 @@ impl std::str::FromStr for Method {
 pub struct Config {
     /// How the pose is found.
     pub method: Method,
+    /// Of [`Method::Lattice`].
+    pub lattice: net_lattice::Config,
 }
 
 impl Config {
     /// Refuses values out of range.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] names the field and the value.
+    /// [`crate::Error`] names the field and the value.
     pub fn validate(&self) -> Result<()> {
-        Ok(())
+        Ok(self.lattice.validate()?)
     }
 }

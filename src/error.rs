@@ -8,21 +8,14 @@ pub enum Error {
     #[error(transparent)]
     Image(#[from] net_image::Error),
     /// A method that does not exist.
-    #[error("method {name:?}: there is thesis")]
+    #[error("method {name:?}: there are lattice and thesis")]
     Method {
         /// The name that was given.
         name: String,
     },
-    /// A parameter out of its range.
-    #[error("configuration: {field} is {value}: {expected}")]
-    Config {
-        /// The parameter, with the section it is in.
-        field: &'static str,
-        /// The value that was given.
-        value: f64,
-        /// What would have been accepted.
-        expected: &'static str,
-    },
+    /// The lattice estimator.
+    #[error(transparent)]
+    Lattice(#[from] net_lattice::Error),
     /// A time that does not come after the one before.
     #[error("frame time {timestamp_ns} ns does not come after the frame before, {previous_ns} ns")]
     TimeOrder {

@@ -33,6 +33,25 @@ pub struct NetPose {
     pub distance_m: f64,
     /// The net's unit normal in the camera frame, positive z.
     pub normal: Vector3<f64>,
+    /// One standard deviation of the range, m.
+    pub sigma_range_m: f64,
+    /// One standard deviation of the normal's direction, root mean square over both axes, rad.
+    pub sigma_tilt: f64,
+    /// One standard deviation of the place along the net, root mean square over both axes, m.
+    pub sigma_xy_m: f64,
+    /// How the net hangs, from the methods that estimate it.
+    pub sheet: Option<Sheet>,
+}
+
+/// How a net hangs: its meshes sheared, the sheet bent. At the optical axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sheet {
+    /// Angle from X to the second mesh direction, rad.
+    pub crossing_angle: f64,
+    /// One standard deviation of it, rad; zero when it was held fixed.
+    pub sigma_crossing_angle: f64,
+    /// Principal curvatures, 1/m, larger magnitude first; positive bends away from the camera.
+    pub curvatures_per_m: [f64; 2],
 }
 
 /// What one frame says. Borrows the tracker's buffers: copy what must outlive the next frame.
@@ -44,6 +63,9 @@ pub struct Estimate<'a> {
     pub probability: f64,
     /// The pose, when the status is [`Status::Ok`].
     pub net: Option<NetPose>,
+    /// Number of the count of cells. While it stays the same the net frame's origin is the same node; it grows by one each time the
+    /// net was lost and the count had to start anew.
+    pub track: u32,
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
 }

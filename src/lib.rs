@@ -6,11 +6,13 @@
 mod config;
 mod error;
 mod estimate;
+mod method;
+mod motion;
 mod tracker;
 
 pub use config::{Config, Method};
 pub use error::{Error, Result};
-pub use estimate::{Estimate, NetPose, Status};
+pub use estimate::{Estimate, NetPose, Sheet, Status};
 pub use net_geometry::{Camera, Junction, JunctionState, Lens, Mesh, Plane, Pose};
 pub use net_image::GrayView;
 pub use tracker::Tracker;

@@ -1,26 +1,40 @@
 use net_geometry::{Camera, Junction, Mesh};
 use net_image::GrayView;
 
-use crate::config::Config;
+use crate::config::{Config, Method};
 use crate::error::{Error, Result};
 use crate::estimate::{Estimate, Status};
+use crate::method::lattice::LatticeMethod;
 
 /// Follows one net through the frames of one camera. Owns all buffers: after the first frames an update allocates nothing.
 #[derive(Debug)]
 pub struct Tracker {
     camera: Camera,
+    method: Engine,
+    threshold: f64,
     previous_ns: Option<i64>,
     junctions: Vec<Junction>,
+}
+
+#[derive(Debug)]
+enum Engine {
+    Lattice(Box<LatticeMethod>),
 }
 
 impl Tracker {
     /// A tracker for pictures of `camera` that show a net of `mesh`.
     ///
     /// # Errors
-    /// [`Error::Config`] for a parameter out of range.
-    pub fn new(camera: Camera, _mesh: Mesh, config: &Config) -> Result<Self> {
+    /// [`Error::Lattice`] for a parameter out of range.
+    pub fn new(camera: Camera, mesh: Mesh, config: &Config) -> Result<Self> {
         config.validate()?;
-        Ok(Self { camera, previous_ns: None, junctions: Vec::new() })
+        let (method, threshold) = match config.method {
+            Method::Lattice => {
+                let method = LatticeMethod::new(&camera, &mesh, &config.lattice)?;
+                (Engine::Lattice(Box::new(method)), config.lattice.probability_threshold)
+            }
+        };
+        Ok(Self { camera, method, threshold, previous_ns: None, junctions: Vec::new() })
     }
 
     /// The next frame, taken at `timestamp_ns` (ns since the Unix epoch).
@@ -29,11 +43,20 @@ impl Tracker {
     /// [`Error::Geometry`] for an image of another size than the camera's, [`Error::TimeOrder`] for a time that does not come
     /// after the frame before. The tracker is then as it was.
     pub fn update(&mut self, image: GrayView<'_>, timestamp_ns: i64) -> Result<Estimate<'_>> {
-        self.camera.check_image_size(image.width() as u32, image.height() as u32)?;
+        // A side past u32 cannot be a calibrated camera's either.
+        let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        self.camera.check_image_size(side(image.width()), side(image.height()))?;
         if let Some(previous_ns) = self.previous_ns.filter(|&p| timestamp_ns <= p) {
             return Err(Error::TimeOrder { timestamp_ns, previous_ns });
         }
         self.previous_ns = Some(timestamp_ns);
-        Ok(Estimate { status: Status::NoNet, probability: 0.0, net: None, junctions: &self.junctions })
+        self.junctions.clear();
+        let found = match &mut self.method {
+            Engine::Lattice(method) => method.update(image, timestamp_ns, &mut self.junctions)?,
+        };
+        let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
+        let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
+        let status = if net.is_some() { Status::Ok } else { Status::NoNet };
+        Ok(Estimate { status, probability, net, track, junctions: &self.junctions })
     }
 }

@@ -139,6 +139,13 @@ impl LatticeEstimator {
         Ok(found)
     }
 
+    /// Follows `estimate` in the next [`Self::update`]: for a caller that changed its names, see [`LatticeEstimate::counted_on`].
+    pub fn follow_on(&mut self, estimate: &LatticeEstimate) {
+        if let Some(work) = &mut self.work {
+            work.last = Some(estimate.followed());
+        }
+    }
+
     /// Forgets the last picture.
     pub fn reset(&mut self) {
         if let Some(work) = &mut self.work {

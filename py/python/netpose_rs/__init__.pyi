@@ -8,7 +8,7 @@ __all__ = ["Camera", "Estimate", "Mesh", "Tracker", "estimate"]
 
 #: uint8, (H, W) grey or (H, W, 3) RGB. Grey with contiguous rows is read in place, anything else is converted once.
 Image = npt.NDArray[np.uint8]
-Method = Literal["thesis"]
+Method = Literal["lattice"]
 
 @final
 class Camera:

@@ -1,0 +1,71 @@
+//! Constant velocity: where the net should be in the next frame.
+
+use net_geometry::Pose;
+use net_geometry::nalgebra::{Rotation3, Vector3};
+
+/// Longest gap between frames, s, over which a velocity is carried on.
+const LONGEST_GAP_S: f64 = 1.0;
+
+/// Camera motion in the net frame, from the last two poses.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Motion {
+    last: Option<(i64, Pose)>,
+    /// Turn of the net as the camera sees it, rad/s, and velocity of the camera in the net frame, m/s.
+    velocity: Option<(Vector3<f64>, Vector3<f64>)>,
+}
+
+impl Motion {
+    /// The pose expected at `timestamp_ns`; `None` without a recent pose.
+    pub fn predict(&self, timestamp_ns: i64) -> Option<Pose> {
+        let (then, pose) = self.last?;
+        let dt = seconds(then, timestamp_ns);
+        if dt > LONGEST_GAP_S {
+            return None;
+        }
+        let Some((turn, speed)) = self.velocity else { return Some(pose) };
+        let rotation = Rotation3::new(turn * dt) * pose.rotation;
+        let centre = pose.camera_in_net() + speed * dt;
+        Some(Pose { rotation, translation: -(rotation * centre) })
+    }
+
+    /// A pose that is believed.
+    pub fn observe(&mut self, timestamp_ns: i64, pose: &Pose) {
+        self.velocity = self.last.and_then(|(then, last)| {
+            let dt = seconds(then, timestamp_ns);
+            (dt > 0.0 && dt <= LONGEST_GAP_S).then(|| {
+                let turn = (pose.rotation * last.rotation.inverse()).scaled_axis() / dt;
+                (turn, (pose.camera_in_net() - last.camera_in_net()) / dt)
+            })
+        });
+        self.last = Some((timestamp_ns, *pose));
+    }
+}
+
+fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rounding of a few dozen double operations.
+    const ROUNDING: f64 = 1e-12;
+
+    #[test]
+    fn a_steady_motion_is_predicted_exactly() {
+        let pose = |t: f64| {
+            let rotation =
+                Rotation3::new(Vector3::new(0.1, -0.2, 0.05) * t) * Rotation3::from_euler_angles(0.1, 0.2, 0.3);
+            let centre = Vector3::new(0.3 * t, -0.1 * t, -1.0 + 0.2 * t);
+            Pose { rotation, translation: -(rotation * centre) }
+        };
+        let mut motion = Motion::default();
+        assert!(motion.predict(0).is_none());
+        motion.observe(0, &pose(0.0));
+        motion.observe(100_000_000, &pose(0.1));
+        let predicted = motion.predict(300_000_000).expect("two poses were seen");
+        assert!((predicted.matrix() - pose(0.3).matrix()).amax() < ROUNDING);
+        assert!(motion.predict(2_000_000_000).is_none(), "too long ago");
+    }
+}
