@@ -19,6 +19,11 @@ const ISLAND_REACH: f64 = 4.0;
 const ISLAND_FRACTION: f64 = 0.25;
 /// How far, cells, a junction may lie from where its neighbours say.
 const NEIGHBOUR_RESIDUAL: f64 = 0.25;
+/// How many junctions nearest to the middle tie the names to an anchored pose, at least; a quarter of them all if that is more.
+const ANCHORS_MIN: usize = 12;
+/// How far, cells, they may lie from where the pose has them, and which part of them must not lie farther.
+const ANCHOR_FRACTION: f64 = 0.35;
+const ANCHORS_AGREE: f64 = 0.7;
 
 /// Index of a node or cell.
 type Index = (i32, i32);
@@ -39,7 +44,9 @@ pub(crate) struct Namer {
     named: Vec<u32>,
     by_index: Vec<(Index, u32)>,
     doubtful: Vec<u32>,
-    offsets: Vec<f64>,
+    /// Squared distance from the middle, px², and name less the pose's lattice coordinates.
+    offsets: Vec<(f64, Vector2<f64>)>,
+    scratch: Vec<f64>,
 }
 
 /// Index of the cell's corner that lies at signs `(+, +)` of the basis is the cell's plus one each.
@@ -315,31 +322,42 @@ impl Namer {
         }
     }
 
-    /// Moves `(0, 0)` to the pose's origin if it is anchored, else to the named junction nearest to the middle.
+    /// Moves `(0, 0)` to the pose's origin if it is anchored, else to the named junction nearest to the middle. Takes all names away where
+    /// an anchored pose does not tell which junction is which.
     fn move_origin(&mut self, knots: &[Knot], net: Option<&ExpectedNet>, middle: Vector2<f64>) {
-        let anchor = net.filter(|n| n.anchored).and_then(|net| self.anchor(knots, net));
-        let nearest = || {
-            let named =
-                self.names.iter().zip(knots).filter_map(|(n, k)| Some(((*n)?, (k.pixel - middle).norm_squared())));
-            named.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(name, _)| name)
+        let origin = match net.filter(|n| n.anchored) {
+            Some(net) => self.anchor(knots, net, middle),
+            None => self.nearest_name(knots, middle),
         };
-        let Some(origin) = anchor.or_else(nearest) else { return };
-        for name in self.names.iter_mut().flatten() {
-            *name = subtract(*name, origin);
+        for name in &mut self.names {
+            *name = name.zip(origin).map(|(name, origin)| subtract(name, origin));
         }
     }
 
-    /// The name that the pose's origin has, if most junctions agree on it.
-    fn anchor(&mut self, knots: &[Knot], net: &ExpectedNet) -> Option<Index> {
-        let mut axis = |pick: fn(Index, Vector2<f64>) -> f64| {
-            self.offsets.clear();
-            let pairs = self.names.iter().zip(knots);
-            self.offsets.extend(pairs.filter_map(|(n, k)| Some(pick((*n)?, net.lattice_at(k.pixel)?))));
-            median(&mut self.offsets)
+    fn nearest_name(&self, knots: &[Knot], middle: Vector2<f64>) -> Option<Index> {
+        let named = self.names.iter().zip(knots).filter_map(|(n, k)| Some(((*n)?, (k.pixel - middle).norm_squared())));
+        named.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(name, _)| name)
+    }
+
+    /// The name that the pose's origin has, if most junctions near the middle (where the pose is the net's tangent) agree on it.
+    fn anchor(&mut self, knots: &[Knot], net: &ExpectedNet, middle: Vector2<f64>) -> Option<Index> {
+        self.offsets.clear();
+        for (name, knot) in self.names.iter().zip(knots) {
+            if let (Some((i, j)), Some(at)) = (*name, net.lattice_at(knot.pixel)) {
+                let offset = Vector2::new(f64::from(i), f64::from(j)) - at;
+                self.offsets.push(((knot.pixel - middle).norm_squared(), offset));
+            }
+        }
+        self.offsets.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        self.offsets.truncate(ANCHORS_MIN.max(self.offsets.len() / 4));
+        let mut axis = |pick: fn(&Vector2<f64>) -> f64| {
+            self.scratch.clear();
+            self.scratch.extend(self.offsets.iter().map(|(_, o)| pick(o)));
+            median(&mut self.scratch)
         };
-        let i = axis(|n, l| f64::from(n.0) - l.x)?;
-        let j = axis(|n, l| f64::from(n.1) - l.y)?;
-        Some((i.round() as i32, j.round() as i32))
+        let whole = Vector2::new(axis(|o| o.x)?, axis(|o| o.y)?).map(f64::round);
+        let agreeing = self.offsets.iter().filter(|(_, o)| (o - whole).amax() < ANCHOR_FRACTION).count();
+        (agreeing as f64 > ANCHORS_AGREE * self.offsets.len() as f64).then_some((whole.x as i32, whole.y as i32))
     }
 }
 
