@@ -1,4 +1,4 @@
-//! Junctions of rendered stills against their truth, with the true pose as the expectation.
+//! Junctions of rendered stills against their truth, with the true pose as the expectation: by contours, then by net adjustment.
 //!
 //! `cargo run --release -p net-junction --example stills -- FOLDER [OVERLAYS]`
 //!
@@ -10,10 +10,11 @@ use std::error::Error;
 use std::path::Path;
 
 use image::{Rgb, RgbImage};
+use net_geometry::JunctionState;
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use net_geometry::{Camera, Junction, Lens, Mesh, Pose};
 use net_image::View;
-use net_junction::{Config, Expectation, ExpectedNet, JunctionDetector, Verdict};
+use net_junction::{AdjustConfig, Config, Expectation, ExpectedNet, JunctionDetector, NetAdjuster, Verdict};
 use serde_json::Value;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -82,18 +83,36 @@ struct Counts {
     visible: usize,
     visible_found: usize,
     squares: f64,
+    /// Squared errors over the claimed variance, both axes.
+    normalised: f64,
+}
+
+impl Counts {
+    fn add(&mut self, other: &Counts) {
+        self.found += other.found;
+        self.right += other.right;
+        self.named += other.named;
+        self.named_right += other.named_right;
+        self.visible += other.visible;
+        self.visible_found += other.visible_found;
+        self.squares += other.squares;
+        self.normalised += other.normalised;
+    }
 }
 
 fn compare(junctions: &[Junction], truth: &Truth) -> Counts {
     let mut counts = Counts { found: junctions.len(), visible: truth.visible.len(), ..Counts::default() };
     let mut taken = std::collections::BTreeSet::new();
-    for junction in junctions {
+    counts.found = 0;
+    for junction in junctions.iter().filter(|j| j.state == JunctionState::Seen) {
+        counts.found += 1;
         counts.named += usize::from(junction.index.is_some());
         let distance = |n: &Node| (n.1 - junction.pixel).norm();
         let Some(node) = truth.nodes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { continue };
         if distance(node) <= 2.0 && taken.insert(node.0) {
             counts.right += 1;
             counts.squares += distance(node).powi(2);
+            counts.normalised += 0.5 * (distance(node) / junction.sigma_px).powi(2);
             counts.named_right += usize::from(junction.index == Some(node.0));
         }
     }
@@ -112,7 +131,7 @@ fn draw_line(canvas: &mut RgbImage, a: Vector2<f64>, b: Vector2<f64>, colour: Rg
     }
 }
 
-fn draw(detector: &JunctionDetector, picture: &image::GrayImage, path: &Path) -> Result<()> {
+fn draw(detector: &JunctionDetector, junctions: &[Junction], picture: &image::GrayImage, path: &Path) -> Result<()> {
     let scale = 2_u32;
     let mut canvas = RgbImage::from_fn(picture.width() * scale, picture.height() * scale, |x, y| {
         let grey = picture.get_pixel(x / scale, y / scale).0[0];
@@ -130,8 +149,14 @@ fn draw(detector: &JunctionDetector, picture: &image::GrayImage, path: &Path) ->
             draw_line(&mut canvas, found.corners[k], found.corners[(k + 1) % 4], colour, scale);
         }
     }
-    for junction in detector.junctions() {
-        let colour = if junction.index.is_some() { Rgb([255, 255, 0]) } else { Rgb([255, 0, 255]) };
+    for junction in junctions {
+        let colour = match (junction.state, junction.index) {
+            (JunctionState::Seen, Some(_)) => Rgb([255, 255, 0]),
+            (JunctionState::Seen, None) => Rgb([255, 0, 255]),
+            (JunctionState::Hidden, _) => Rgb([80, 80, 255]),
+            (JunctionState::Fouled, _) => Rgb([0, 160, 60]),
+            (JunctionState::Missing, _) => Rgb([255, 0, 0]),
+        };
         for arm in [Vector2::new(1.5, 0.0), Vector2::new(0.0, 1.5)] {
             draw_line(&mut canvas, junction.pixel - arm, junction.pixel + arm, colour, scale);
         }
@@ -148,9 +173,11 @@ fn main() -> Result<()> {
     truths.retain(|entry| entry.path().extension().is_some_and(|e| e == "json"));
     truths.sort_by_key(std::fs::DirEntry::file_name);
     println!(
-        "| still | visible | found | recall | precision 2 px | RMSE px | named | named right |\n|---|---|---|---|---|---|---|---|"
+        "| still | visible |{}",
+        " found | recall | precision 2 px | RMSE px | error / sigma | named right |".repeat(2)
     );
-    let mut total = Counts::default();
+    println!("|---|---|{}", "---|---|---|---|---|---|".repeat(2));
+    let mut total = [Counts::default(); 2];
     for entry in truths {
         let json: Value = serde_json::from_slice(&std::fs::read(entry.path())?)?;
         let Some(truth) = read_truth(&json)? else { continue };
@@ -159,35 +186,39 @@ fn main() -> Result<()> {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let config = Config { keep_rejected: overlays.is_some(), ..Config::default() };
         let mut detector = JunctionDetector::new(width, height, &config)?;
+        let mut adjuster = NetAdjuster::new(width, height, &AdjustConfig::default())?;
         let view = View::packed(picture.as_raw(), width, height)?;
-        let counts = compare(detector.detect(view, Some(&Expectation::Net(truth.net.clone())))?, &truth);
-        print_row(name, &counts);
-        total.found += counts.found;
-        total.right += counts.right;
-        total.named += counts.named;
-        total.named_right += counts.named_right;
-        total.visible += counts.visible;
-        total.visible_found += counts.visible_found;
-        total.squares += counts.squares;
+        let contours = compare(detector.detect(view, Some(&Expectation::Net(truth.net.clone())))?, &truth);
+        let adjusted = compare(adjuster.adjust(view, &truth.net)?, &truth);
+        print_row(name, &[contours, adjusted]);
+        total[0].add(&contours);
+        total[1].add(&adjusted);
         if let Some(overlays) = &overlays {
             std::fs::create_dir_all(overlays)?;
-            draw(&detector, &picture, &Path::new(overlays).join(name).with_extension("png"))?;
+            let stem = Path::new(name).file_stem().and_then(|s| s.to_str()).ok_or("no name")?;
+            let path = |method: &str| Path::new(overlays).join(format!("{stem}-{method}.png"));
+            draw(&detector, detector.junctions(), &picture, &path("contours"))?;
+            draw(&JunctionDetector::new(width, height, &config)?, adjuster.junctions(), &picture, &path("adjusted"))?;
         }
     }
     print_row("all", &total);
     Ok(())
 }
 
-fn print_row(name: &str, c: &Counts) {
+fn print_row(name: &str, counts: &[Counts; 2]) {
     let part = |a: usize, b: usize| if b > 0 { a as f64 / b as f64 } else { f64::NAN };
-    println!(
-        "| {name} | {} | {} | {:.3} | {:.3} | {:.2} | {} | {:.3} |",
-        c.visible,
-        c.found,
-        part(c.visible_found, c.visible),
-        part(c.right, c.found),
-        (c.squares / c.right.max(1) as f64).sqrt(),
-        c.named,
-        part(c.named_right, c.named),
-    );
+    print!("| {name} | {} |", counts[0].visible);
+    for c in counts {
+        let n = c.right.max(1) as f64;
+        print!(
+            " {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} |",
+            c.found,
+            part(c.visible_found, c.visible),
+            part(c.right, c.found),
+            (c.squares / n).sqrt(),
+            (c.normalised / n).sqrt(),
+            part(c.named_right, c.named),
+        );
+    }
+    println!();
 }

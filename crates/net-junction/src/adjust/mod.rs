@@ -1,0 +1,16 @@
+//! Junctions by adjusting a predicted lattice to the picture: a small bundle adjustment in the image plane.
+
+mod adjuster;
+mod config;
+mod graph;
+mod locate;
+mod map;
+mod presence;
+mod profile;
+mod solve;
+mod template;
+
+pub use adjuster::NetAdjuster;
+pub use config::AdjustConfig;
+pub use map::LatticeMap;
+pub use presence::{Twine, TwineState};
