@@ -108,7 +108,7 @@ impl RawFrame {
     /// [`FrameError`]: the frame is to be counted as unreadable, the log goes on.
     pub fn decode(&self) -> Result<Image<u8>, FrameError> {
         match &self.payload {
-            Payload::File(path) => picture::decode(&read(path)?),
+            Payload::File(path) => read_image(path),
             Payload::Refused(error) => Err(error.clone()),
         }
     }
@@ -124,6 +124,14 @@ impl RawFrame {
     pub(crate) fn is_refused(&self) -> bool {
         matches!(self.payload, Payload::Refused(_))
     }
+}
+
+/// Reads and decodes one image file that belongs to no log, to grey, 0 black to 255 white.
+///
+/// # Errors
+/// [`FrameError`] says what is wrong with the file; the caller knows its name.
+pub fn read_image(path: &Path) -> Result<Image<u8>, FrameError> {
+    picture::decode(&read(path)?)
 }
 
 /// A whole file, unless it is too large to be a picture.
