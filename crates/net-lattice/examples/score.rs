@@ -4,7 +4,10 @@
 //!
 //! A line per picture, then a table by group. Wrong: range off by 5 %, normal or in-plane rotation by 5 degrees.
 
-use std::path::{Path, PathBuf};
+#[path = "draw/mod.rs"]
+mod draw;
+
+use std::path::PathBuf;
 use std::time::Instant;
 
 use net_geometry::nalgebra::{Matrix3, Vector2, Vector3};
@@ -173,40 +176,6 @@ fn quantile(values: &mut [f64], q: f64) -> f64 {
     values[((values.len() - 1) as f64 * q).round() as usize]
 }
 
-fn overlay(path: &Path, gray: &image::GrayImage, camera: &Camera, e: &LatticeEstimate) {
-    let up = 2u32;
-    let (w, h) = gray.dimensions();
-    let mut out = image::RgbImage::new(w * up, h * up);
-    let at = |u: u32, v: u32| {
-        let p = Vector2::new((f64::from(u) + 0.5) / f64::from(up) - 0.5, (f64::from(v) + 0.5) / f64::from(up) - 0.5);
-        e.lattice_from_pixel(camera, p)
-    };
-    let mut above: Vec<Option<Vector2<f64>>> = vec![None; (w * up) as usize];
-    for v in 0..h * up {
-        let mut left: Option<Vector2<f64>> = None;
-        for u in 0..w * up {
-            let g = gray.get_pixel(u / up, v / up).0[0];
-            let mut rgb = [g, g, g];
-            let here = at(u, v);
-            if let (Some(a), Some(b), Some(c)) = (here, left, above[u as usize]) {
-                let crosses = |f: usize| a[f].floor() != b[f].floor() || a[f].floor() != c[f].floor();
-                let wide = |f: usize| (a[f] - b[f]).abs().max((a[f] - c[f]).abs()) < 0.15;
-                if crosses(0) && wide(0) {
-                    rgb = [0, 255, 0];
-                } else if crosses(1) && wide(1) {
-                    rgb = [255, 80, 0];
-                }
-            }
-            out.put_pixel(u, v, image::Rgb(rgb));
-            left = here;
-            above[u as usize] = here;
-        }
-    }
-    if let Err(error) = out.save(path) {
-        eprintln!("{}: {error}", path.display());
-    }
-}
-
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let mut draw: Option<PathBuf> = None;
@@ -277,10 +246,11 @@ fn main() {
         if let Some(e) = &found {
             let v = &e.evidence;
             println!(
-                " | z {:.3} {:?} {:?} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} n {}/{} margin {:.2} gain {:.4}",
+                " | z {:.3} {:?} {:?} bend {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} n {}/{} margin {:.2} gain {:.4} near {:.2} ({}/{}) sd {:.2}% {:.2}deg",
                 e.range,
                 e.model,
                 e.polarity,
+                v.bend.to_degrees(),
                 v.v[0],
                 v.v[1],
                 v.v2[0],
@@ -289,10 +259,15 @@ fn main() {
                 v.tiles,
                 v.tiles2,
                 e.margin,
-                e.gain
+                e.gain,
+                v.good_near,
+                v.near[0],
+                v.near[1],
+                100.0 * e.range_sigma / e.range,
+                e.tilt_sigma.to_degrees()
             );
             if let Some(dir) = &draw {
-                overlay(&dir.join(format!("{name}.png")), &gray, &camera, e);
+                draw::overlay(&dir.join(format!("{name}.png")), &gray, &camera, e);
             }
         } else {
             println!();

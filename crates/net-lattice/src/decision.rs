@@ -1,6 +1,6 @@
 //! Is it a net, and is the answer right? Statistics that a flexible fit cannot raise, and a probability from them.
 
-use crate::lockin::Measurement;
+use crate::lockin::{Measurement, Window};
 
 /// Coherence of the phases left over in the tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -12,6 +12,13 @@ pub struct Evidence {
     pub v2: [f64; 2],
     /// Share of tiles with both residual phases below 1 rad.
     pub good: f64,
+    /// The same among the tiles about the optical axis, where range and normal are claimed; zero without such tiles.
+    pub good_near: f64,
+    /// Angle, rad, between the tangent plane on the axis and the mean plane about it. Where a sheet bends by more than the tolerance
+    /// inside the view, "the" normal means little.
+    pub bend: f64,
+    /// Tiles about the optical axis that counted, of those there are.
+    pub near: [usize; 2],
     /// Tiles that counted.
     pub tiles: usize,
     /// Tiles that counted for the second harmonic.
@@ -44,11 +51,38 @@ impl Evidence {
         e
     }
 
+    /// Adds what is known about the optical axis.
+    pub(crate) fn near(mut self, measurements: &[Measurement], window: Window) -> Self {
+        let mut aligned = 0;
+        for m in measurements {
+            let (u, v) = (m.site.pixel[0] - window.centre[0], m.site.pixel[1] - window.centre[1]);
+            if u.hypot(v) > window.radius {
+                continue;
+            }
+            self.near[1] += 1;
+            self.near[0] += usize::from(m.good);
+            aligned += usize::from(m.good && m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
+        }
+        self.good_near = aligned as f64 / self.near[1].max(1) as f64;
+        self
+    }
+
+    /// Adds the angle between tangent and mean plane.
+    pub(crate) fn bent_by(mut self, angle: f64) -> Self {
+        self.bend = angle;
+        self
+    }
+
     /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
+    ///
+    /// Two logistic rules, both of which must hold: coherence of fundamental and second harmonic over the picture; the same with the share
+    /// of agreeing tiles about the optical axis, where the claim is made. Then the chance that tangent and mean plane are the same thing.
     pub fn probability(&self) -> f64 {
         let v = self.v[0].min(self.v[1]);
         let v2 = self.v2[0].abs().min(self.v2[1].abs());
-        let logit = -4.0 + 0.47 * v + 0.53 * v2;
-        1.0 / (1.0 + (-logit).exp())
+        let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
+        let everywhere = logistic(-4.0 + 0.47 * v + 0.53 * v2);
+        let here = logistic(-5.5 + 0.31 * v + 5.9 * self.good_near + 0.39 * v2);
+        everywhere.min(here) * logistic((3.5 - self.bend.to_degrees()) / 0.4)
     }
 }

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::estimate::{Followed, Labels, LatticeEstimate};
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
-use crate::lockin::{Measurement, TileSum, demodulate, measure};
+use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
 use crate::model::{self, Model};
 use crate::numeric::magnitude_quantile;
@@ -33,6 +33,8 @@ const COLD: [(f64, Model); 7] = [
 const RIVAL: [(f64, Model); 2] = [(110.0, Model::Rhomb), (250.0, Model::Quadratic)];
 /// Rival depths: scaling depth by m scales every phase by m.
 const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Candidates of the search that are locked to: at least the first number, more while none is coherent.
+const CANDIDATES: (usize, usize) = (3, 8);
 /// Smallest cell, full-resolution px on the axis, that is looked for.
 const SMALLEST_CELL: f64 = 3.7;
 
@@ -224,32 +226,32 @@ impl Workspace {
     }
 
     /// One lock-in at the predicted sheet.
-    fn measure(&mut self, surface: &Surface, place: (usize, usize), sign: f64) {
+    fn measure<const SECOND: bool>(&mut self, surface: &Surface, place: (usize, usize), sign: f64, window: &Window) {
         let gain = self.high(place.0, self.cell_px(surface.depth));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
-        demodulate(level, place.1, &t.map, gain, &mut t.sums);
+        demodulate::<SECOND>(level, place.1, &t.map, gain, window, &mut t.sums);
         measure(surface, &self.view, place, sign, &t.sums, &mut t.measurements);
     }
 
-    /// Lock-in and fit with a growing window.
+    /// A window about the optical axis, radius in px of an 848 x 480 px picture.
+    fn window(&self, radius: f64) -> Window {
+        Window { centre: self.view.centre, radius: radius * self.view.size }
+    }
+
+    /// Lock-in and fit with a growing window. The measurements left behind are those of the last pass, before its step.
     fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], fresh: bool) -> Option<Surface> {
         let mut surface = *start;
-        let centre = self.view.centre;
-        let size = self.view.size;
-        let window = |m: &Measurement, radius: f64| {
-            let (u, v) = (m.site.pixel[0] - centre[0], m.site.pixel[1] - centre[1]);
-            (-(u * u + v * v) / (2.0 * (radius * size).powi(2))).exp()
-        };
         let place = self.scale_for(surface.depth);
         if fresh {
             surface.offset = [0.0; 2];
-            self.measure(&surface, (place.0, 0), 1.0);
+            let window = self.window(110.0);
+            self.measure::<false>(&surface, (place.0, 0), 1.0, &window);
             for f in 0..2 {
                 let mut sum = [0.0; 2];
                 for m in self.tools.measurements.iter().filter(|m| m.good) {
-                    let w = window(m, 110.0);
+                    let w = window.weight(m.site.pixel);
                     sum[0] += w * m.z[f][0];
                     sum[1] += w * m.z[f][1];
                 }
@@ -257,7 +259,8 @@ impl Workspace {
             }
         }
         for &(radius, model) in schedule {
-            self.measure(&surface, place, 1.0);
+            let window = self.window(radius);
+            self.measure::<false>(&surface, place, 1.0, &window);
             let t = &mut self.tools;
             t.observations.clear();
             for m in &t.measurements {
@@ -265,7 +268,7 @@ impl Workspace {
                     if !m.good || m.snr[f] <= 3.0 {
                         return 0.0;
                     }
-                    m.snr[f].min(60.0) * window(m, radius) * std::f64::consts::TAU.powi(2)
+                    m.snr[f].min(60.0) * window.weight(m.site.pixel) * std::f64::consts::TAU.powi(2)
                 };
                 let s = |f: usize| m.predicted.s[f] + m.phase[f] / std::f64::consts::TAU;
                 t.observations.push(Observation { site: m.site, s: [s(0), s(1)], weight: [w(0), 0.0, w(1)] });
@@ -291,28 +294,29 @@ impl Workspace {
         }
     }
 
-    /// Gain of the drawing for both polarities; dark twine is the lattice half a cell off with the opposite sign.
-    fn gains(
+    /// Best gain of the drawing over polarities and blurs (px), every second block compared. Dark twine is the lattice half a cell off
+    /// with the opposite sign: the lock-in cannot tell it from bright twine, the drawing can.
+    fn gain(
         &mut self,
         surface: &Surface,
         level: usize,
         cell: f64,
+        polarities: &[Polarity],
         blurs: &[f64],
-        sparse: bool,
     ) -> (f64, Polarity, f64) {
         self.high(level, cell);
+        let area = self.view.levels[level].scale.powi(2);
         let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
         self.tools.map.fill(surface, &self.view.levels[level]);
         self.tools.likelihood.load(&self.view.levels[level]);
         self.tools.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
         for &blur in blurs {
-            for polarity in [Polarity::Bright, Polarity::Dark] {
+            for &polarity in polarities {
                 let mut drawing = self.drawing(level, cell, polarity, blur);
-                drawing.sparse = sparse;
+                drawing.sparse = true;
                 drawing.offset = if polarity == Polarity::Dark { 0.5 } else { 0.0 };
                 let t = &mut self.tools;
-                let gain =
-                    t.likelihood.gain(&t.map, &drawing, &mut t.smoother) * (self.view.levels[level].scale).powi(2);
+                let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother) * area;
                 if gain > best.0 {
                     best = (gain, polarity, blur);
                 }
@@ -324,16 +328,24 @@ impl Workspace {
     fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
         self.search();
         let mut locks: Vec<Lock> = Vec::new();
-        for c in self.candidates.clone().into_iter().take(3) {
+        for k in 0..self.candidates.len().min(CANDIDATES.1) {
+            let c = self.candidates[k];
+            if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
+                break;
+            }
             let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
             let Some(surface) = self.lock(&start, &COLD, true) else { continue };
-            let place = self.scale_for(surface.depth);
-            self.measure(&surface, place, 1.0);
+            self.measure::<false>(&surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
             let evidence = Evidence::new(&self.tools.measurements);
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
-            let (gain, polarity, blur) = self.gains(&surface, level, cell, &[0.76, 1.8], false);
+            let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
             locks.push(Lock { surface, evidence, gain, polarity, blur });
+            // Nearly every tile agrees: other candidates could only be other periods, which are tested below.
+            let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
+            if coherence > 0.8 && evidence.good > 0.9 {
+                break;
+            }
         }
         let lock = self.best_lock(locks)?;
         let (lock, margin) = self.true_cell(lock)?;
@@ -371,7 +383,10 @@ impl Workspace {
             found.clear();
             search.run(bank, &self.scope, 6, &mut found);
             let scale = self.view.levels[bank.level].scale;
-            refined.extend(found.iter().map(|c| search::refine(bank, scale, &self.scope, c)));
+            found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
+            let range = search.depths_m(self.scope.sides[0]);
+            search::add_rivals(bank, scale, &self.scope, range, &mut found);
+            refined.append(&mut found);
         }
         search::distinct(&mut refined);
         self.candidates = refined;
@@ -400,16 +415,20 @@ impl Workspace {
         let widest = self.cell_px(lock.surface.depth * first);
         let level = self.view.level_for(cell / last, 6.0);
         let mut all: Vec<(f64, f64, Lock)> = Vec::new();
+        let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
         for m in rivals {
             let surface = if m == 1.0 {
                 lock.surface
             } else {
-                match self.lock(&lock.surface.scaled(m), &RIVAL, false) {
-                    Some(s) => s,
-                    None => continue,
+                let Some(s) = self.lock(&lock.surface.scaled(m), &RIVAL, true) else { continue };
+                let v = Evidence::new(&self.tools.measurements).v;
+                // Waves of that period are not there at all.
+                if v[0].min(v[1]) < 1.0 {
+                    continue;
                 }
+                s
             };
-            let (gain, polarity, blur) = self.gains(&surface, level, widest, &[0.76, 1.5, 2.8], true);
+            let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
             all.push((gain, m, Lock { surface, gain, polarity, blur, ..lock }));
         }
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -423,7 +442,28 @@ impl Workspace {
         if best.polarity == Polarity::Dark {
             best.surface.offset.iter_mut().for_each(|o| *o += 0.5);
         }
+        self.seat_families(&mut best, level, widest);
         Some((best, (gain - second) / gain.abs().max(1e-9)))
+    }
+
+    /// One family can sit half a cell off when the other decided the polarity: the drawing tells.
+    fn seat_families(&mut self, best: &mut Lock, level: usize, widest: f64) {
+        self.high(level, widest);
+        let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
+        drawing.sparse = true;
+        let mut top = (f64::NEG_INFINITY, best.surface);
+        for shift in [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]] {
+            let mut surface = best.surface;
+            surface.offset[0] += shift[0];
+            surface.offset[1] += shift[1];
+            let t = &mut self.tools;
+            t.map.fill(&surface, &self.view.levels[level]);
+            let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother);
+            if gain > top.0 {
+                top = (gain, surface);
+            }
+        }
+        best.surface = top.1;
     }
 
     /// Refines on the drawing: one shift per tile and pass, the sheet fitted to those.
@@ -497,8 +537,10 @@ impl Workspace {
         );
         let errors = covariance::pose(&surface, &labels, &c, count);
         let place = self.scale_for(surface.depth);
-        self.measure(&surface, place, f64::from(lock.polarity.sign()));
-        let evidence = Evidence::new(&self.tools.measurements);
+        self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
+        let evidence = Evidence::new(&self.tools.measurements).near(&self.tools.measurements, self.window(220.0));
+        let mean_plane = self.mean_plane(&surface);
+        let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {
             pose: labels.pose(&surface),
@@ -507,7 +549,7 @@ impl Workspace {
             range_sigma: errors.range,
             tilt_sigma: errors.tilt,
             xy_sigma: errors.xy,
-            mean_plane: self.mean_plane(&surface),
+            mean_plane,
             crossing_angle: if odd { std::f64::consts::PI - surface.angle } else { surface.angle },
             crossing_angle_sigma: errors.angle,
             curvatures: curvatures(&surface),

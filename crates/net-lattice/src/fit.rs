@@ -59,6 +59,8 @@ pub(crate) struct Fit {
 #[derive(Debug, Default)]
 pub(crate) struct Fitter {
     jacobian: Vec<[[f64; PARAMETERS]; 2]>,
+    /// Depth at each site.
+    depth: Vec<f64>,
     /// Residuals of the last iteration, before its step; NaN where the sheet is not seen.
     pub residuals: Vec<[f64; 2]>,
 }
@@ -79,11 +81,11 @@ impl Fitter {
         self.jacobian.resize(observations.len(), [[0.0; PARAMETERS]; 2]);
         let chart = surface.chart();
         let mut base = [0.0; 2];
+        self.depth.clear();
         for o in observations {
-            self.residuals.push(match chart.at(o.site.ray[0], o.site.ray[1]) {
-                Some(p) if o.weight[0] + o.weight[2] > 0.0 => [o.s[0] - p.s[0], o.s[1] - p.s[1]],
-                _ => [f64::NAN; 2],
-            });
+            let seen = chart.at(o.site.ray[0], o.site.ray[1]).filter(|_| o.weight[0] + o.weight[2] > 0.0);
+            self.depth.push(seen.map_or(0.0, |p| p.depth));
+            self.residuals.push(seen.map_or([f64::NAN; 2], |p| [o.s[0] - p.s[0], o.s[1] - p.s[1]]));
         }
         for k in 0..count {
             if k == 4 || k == 5 {
@@ -95,13 +97,14 @@ impl Fitter {
             let mut d = [0.0; PARAMETERS];
             d[k] = STEP[k];
             let chart = surface.stepped(&d).chart();
-            for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&mut self.jacobian) {
+            let rows = observations.iter().zip(&self.residuals).zip(&self.depth).zip(&mut self.jacobian);
+            for (((o, r), depth), j) in rows {
                 if r[0].is_nan() {
                     continue;
                 }
                 base[0] = o.s[0] - r[0];
                 base[1] = o.s[1] - r[1];
-                if let Some(p) = chart.at(o.site.ray[0], o.site.ray[1]) {
+                if let Some(p) = chart.at_from(o.site.ray[0], o.site.ray[1], Some(*depth)) {
                     j[0][k] = (p.s[0] - base[0]) / STEP[k];
                     j[1][k] = (p.s[1] - base[1]) / STEP[k];
                 }

@@ -24,6 +24,8 @@ pub enum Polarity {
 }
 
 impl Polarity {
+    pub(crate) const BOTH: [Self; 2] = [Self::Bright, Self::Dark];
+
     pub(crate) fn sign(self) -> f32 {
         match self {
             Self::Bright => 1.0,
@@ -107,7 +109,7 @@ impl Likelihood {
     }
 
     /// Draws the net and its derivatives, and removes from it what the high-pass filter removed from the picture.
-    fn draw(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) {
+    fn draw<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) {
         let bx = self.blocks_x;
         for y in 0..self.blocks_y {
             for x in 0..bx {
@@ -129,11 +131,16 @@ impl Likelihood {
                 for k in 0..PIXELS {
                     let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
                     let at = |p: &crate::map::Plane| wrap(p.s + drawing.offset + p.du * u + p.dv * v);
-                    let (p1, g1) = look_up(rows[0], at(&planes[0]));
-                    let (p2, g2) = look_up(rows[1], at(&planes[1]));
-                    t[k] = 1.0 - (1.0 - p1) * (1.0 - p2);
-                    d1[k] = (1.0 - p2) * g1;
-                    d2[k] = (1.0 - p1) * g2;
+                    let (q1, q2) = (at(&planes[0]), at(&planes[1]));
+                    if SLOPES {
+                        let (p1, g1) = look_up(rows[0], q1);
+                        let (p2, g2) = look_up(rows[1], q2);
+                        t[k] = 1.0 - (1.0 - p1) * (1.0 - p2);
+                        d1[k] = (1.0 - p2) * g1;
+                        d2[k] = (1.0 - p1) * g2;
+                    } else {
+                        t[k] = 1.0 - (1.0 - look_up(rows[0], q1).0) * (1.0 - look_up(rows[1], q2).0);
+                    }
                     sum += t[k];
                 }
                 *mean = sum / PIXELS as f32;
@@ -191,7 +198,7 @@ impl Likelihood {
 
     /// Robust log-likelihood gain of the drawing over an empty picture (Cauchy noise), natural units.
     pub(crate) fn gain(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) -> f64 {
-        self.draw(map, drawing, smoother);
+        self.draw::<false>(map, drawing, smoother);
         self.fit_amplitude(drawing, smoother);
         let per = 1.0 / (1.5 * self.noise);
         let mut gain = 0.0f64;
@@ -225,7 +232,7 @@ impl Likelihood {
         smoother: &mut Smoother,
         out: &mut Vec<Observation>,
     ) {
-        self.draw(map, drawing, smoother);
+        self.draw::<true>(map, drawing, smoother);
         self.fit_amplitude(drawing, smoother);
         self.cap_amplitude();
         let clip = (4.0 * self.noise).powi(2);

@@ -1,6 +1,6 @@
 //! Lock-in: the picture multiplied by the predicted waves and summed over tiles. What phase is left over says where the lattice really is.
 
-use crate::map::PhaseMap;
+use crate::map::{PhaseMap, Plane};
 use crate::numeric::sin_cos_cycles;
 use crate::surface::{Point, Surface};
 use crate::view::{BLOCK, Level, Site, View};
@@ -38,38 +38,85 @@ pub(crate) struct Measurement {
     pub good: bool,
 }
 
-/// Demodulates `high` of a level over its tiles.
-pub(crate) fn demodulate(level: &Level, tiling: usize, map: &PhaseMap, gain: f32, sums: &mut Vec<TileSum>) {
+/// Which part of the picture a lock-in looks at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Window {
+    /// Middle, full-resolution px.
+    pub centre: [f64; 2],
+    /// Standard deviation, full-resolution px.
+    pub radius: f64,
+}
+
+impl Window {
+    /// Everything.
+    pub(crate) const ALL: Self = Self { centre: [0.0; 2], radius: f64::INFINITY };
+
+    /// Weight of a place.
+    pub(crate) fn weight(&self, pixel: [f64; 2]) -> f64 {
+        let (u, v) = (pixel[0] - self.centre[0], pixel[1] - self.centre[1]);
+        if self.radius.is_finite() { (-(u * u + v * v) / (2.0 * self.radius * self.radius)).exp() } else { 1.0 }
+    }
+}
+
+/// Weight below which tiles are not looked at.
+const NEGLIGIBLE: f64 = 0.01;
+
+/// Demodulates `high` of a level over its tiles. `SECOND`: the second harmonic as well.
+pub(crate) fn demodulate<const SECOND: bool>(
+    level: &Level,
+    tiling: usize,
+    map: &PhaseMap,
+    gain: f32,
+    window: &Window,
+    sums: &mut Vec<TileSum>,
+) {
     let grid = &level.tiles[tiling];
     sums.clear();
     sums.resize(grid.nx * grid.ny, TileSum::default());
     let (bx, by) = level.blocks();
     for y in 0..by {
         let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.high.row(y * BLOCK + r));
-        let tiles = &mut sums[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
-        for x in 0..bx {
-            let Some(planes) = map.block(x, y) else { continue };
-            let tile = &mut tiles[usize::from(grid.column[x])];
-            let mut p = [[0.0f32; 4]; 4];
-            let mut power = 0.0;
-            for (p, row) in p.iter_mut().zip(rows) {
-                for (p, i) in p.iter_mut().zip(&row[x * BLOCK..][..BLOCK]) {
-                    *p = (i * gain).clamp(-1.0, 1.0);
-                    power += *p * *p;
+        let first = usize::from(grid.row[y]) * grid.nx;
+        let sites = &grid.sites[first..][..grid.nx];
+        let tiles = &mut sums[first..][..grid.nx];
+        let mut x = 0;
+        while x < bx {
+            let tx = usize::from(grid.column[x]);
+            if window.weight(sites[tx].pixel) < NEGLIGIBLE {
+                while x < bx && usize::from(grid.column[x]) == tx {
+                    x += 1;
                 }
+                continue;
             }
-            tile.power += f64::from(power);
-            tile.count += (BLOCK * BLOCK) as f64;
-            for (f, w) in planes.iter().enumerate() {
-                let (s, c) = sin_cos_cycles(w.s);
-                let first = wave(&p, w.du, w.dv);
-                tile.z[f][0] += f64::from(first.0 * c + first.1 * s);
-                tile.z[f][1] += f64::from(first.1 * c - first.0 * s);
-                let (s2, c2) = (2.0 * s * c, 1.0 - 2.0 * s * s);
-                let second = wave(&p, 2.0 * w.du, 2.0 * w.dv);
-                tile.z2[f][0] += f64::from(second.0 * c2 + second.1 * s2);
-                tile.z2[f][1] += f64::from(second.1 * c2 - second.0 * s2);
+            let tile = &mut tiles[tx];
+            while x < bx && usize::from(grid.column[x]) == tx {
+                if let Some(planes) = map.block(x, y) {
+                    let pixels = std::array::from_fn(|r| std::array::from_fn(|c| rows[r][x * BLOCK + c]));
+                    accumulate::<SECOND>(&pixels, gain, &planes, tile);
+                }
+                x += 1;
             }
+        }
+    }
+}
+
+/// One block's share.
+#[inline]
+fn accumulate<const SECOND: bool>(pixels: &[[f32; 4]; 4], gain: f32, planes: &[Plane; 2], tile: &mut TileSum) {
+    let p = pixels.map(|row| row.map(|i| (i * gain).clamp(-1.0, 1.0)));
+    let power: f32 = p.iter().flatten().map(|p| p * p).sum();
+    tile.power += f64::from(power);
+    tile.count += (BLOCK * BLOCK) as f64;
+    for (f, w) in planes.iter().enumerate() {
+        let (s, c) = sin_cos_cycles(w.s);
+        let first = wave(&p, w.du, w.dv);
+        tile.z[f][0] += f64::from(first.0 * c + first.1 * s);
+        tile.z[f][1] += f64::from(first.1 * c - first.0 * s);
+        if SECOND {
+            let (s2, c2) = (2.0 * s * c, 1.0 - 2.0 * s * s);
+            let second = wave(&p, 2.0 * w.du, 2.0 * w.dv);
+            tile.z2[f][0] += f64::from(second.0 * c2 + second.1 * s2);
+            tile.z2[f][1] += f64::from(second.1 * c2 - second.0 * s2);
         }
     }
 }

@@ -56,6 +56,8 @@ pub(crate) struct Search {
     steps: usize,
     /// Steps that are hypotheses' fundamentals.
     depths: std::ops::Range<usize>,
+    /// Tiles of the bank that are looked at.
+    tiles: Vec<usize>,
     walks: Vec<Walk>,
     power_of_step: Vec<f32>,
     sums: Vec<f32>,
@@ -101,8 +103,11 @@ impl Search {
         let base = view.focal / largest;
         let last = (12.0 * (largest / smallest).log2()).ceil() as usize + 1;
         let steps = last + HARMONICS[5] + 1;
-        let mut walks = Vec::with_capacity(bank.sites.len() * normals.len() * DIRECTIONS);
-        for site in &bank.sites {
+        // Many tiles overlap: every second one is enough to rank hypotheses.
+        let stride = if bank.sites.len() > 20 { 2 } else { 1 };
+        let tiles: Vec<usize> = (0..bank.sites.len()).step_by(stride).collect();
+        let mut walks = Vec::with_capacity(tiles.len() * normals.len() * DIRECTIONS);
+        for site in tiles.iter().map(|t| &bank.sites[*t]) {
             for r in &normals {
                 let g = gradient(r, site);
                 for k in 0..DIRECTIONS {
@@ -143,9 +148,16 @@ impl Search {
             sums: vec![0.0; cells * steps],
             scores: vec![0.0; cells * steps],
             normals,
+            tiles,
             walks,
             counts,
         }
+    }
+
+    /// Nearest and farthest depth of the table for a side of `side` m.
+    pub(crate) fn depths_m(&self, side: f64) -> (f64, f64) {
+        let of = |k: usize| self.base * f64::from(self.power_of_step[k]) * side;
+        (of(0), of(self.depths.end - 1))
     }
 
     /// Scores every (normal, direction, depth) for one family.
@@ -153,9 +165,9 @@ impl Search {
         let cells = self.normals.len() * DIRECTIONS;
         let steps = self.steps;
         self.sums.fill(0.0);
-        for t in 0..bank.sites.len() {
-            let power = bank.coarse_tile(t);
-            for (w, sums) in self.walks[t * cells..][..cells].iter().zip(self.sums.chunks_exact_mut(steps)) {
+        for (t, walks) in self.tiles.iter().zip(self.walks.chunks_exact(cells)) {
+            let power = bank.coarse_tile(*t);
+            for (w, sums) in walks.iter().zip(self.sums.chunks_exact_mut(steps)) {
                 let range = usize::from(w.first)..usize::from(w.end);
                 for (sum, p) in sums[range.clone()].iter_mut().zip(&self.power_of_step[range]) {
                     let ix = (w.x * p + 0.5) as usize;
@@ -266,7 +278,7 @@ pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) 
             if x < 0.0 {
                 (x, y) = (-x, -y);
             }
-            let len = x.hypot(y);
+            let len = (x * x + y * y).sqrt();
             if len * (bank.length as f64) < 0.4 {
                 continue;
             }
@@ -338,6 +350,25 @@ pub(crate) fn refine(bank: &Bank, scale: f64, scope: &Scope, start: &Candidate) 
         step.iter_mut().for_each(|s| *s *= 0.6);
     }
     best
+}
+
+/// Depths at which the same picture scores nearly as well, because harmonics coincide: refined, and added when they do.
+pub(crate) fn add_rivals(bank: &Bank, scale: f64, scope: &Scope, range: (f64, f64), found: &mut Vec<Candidate>) {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    for k in 0..found.len().min(3) {
+        let best = found[k];
+        for m in [0.5, 2.0 / 3.0, 1.5, 2.0, 3.0] {
+            let mut rival = best;
+            rival.depth *= m;
+            if rival.depth < range.0 || rival.depth > range.1 {
+                continue;
+            }
+            let rival = refine(bank, scale, scope, &rival);
+            if rival.score > 0.6 * best.score {
+                found.push(rival);
+            }
+        }
+    }
 }
 
 /// Sorts by score and drops near copies.

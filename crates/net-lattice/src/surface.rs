@@ -273,6 +273,12 @@ impl Chart {
     /// Where the ray `(x, y, 1)` meets the sheet. `None` where it is edge-on, behind or too far to be resolved.
     #[inline]
     pub(crate) fn at(&self, x: f64, y: f64) -> Option<Point> {
+        self.at_from(x, y, None)
+    }
+
+    /// The same with a depth to start from, for sheets that differ little.
+    #[inline]
+    pub(crate) fn at_from(&self, x: f64, y: f64, start: Option<f64>) -> Option<Point> {
         let nd = self.n[0] * x + self.n[1] * y + self.n[2];
         if nd < 0.06 {
             return None;
@@ -286,6 +292,7 @@ impl Chart {
         let a2 = self.e2[0] * x + self.e2[1] * y + self.e2[2];
         let (b1, b2) = (self.e1[2] * self.z, self.e2[2] * self.z);
         if self.bent {
+            depth = start.unwrap_or(depth);
             for _ in 0..4 {
                 let (h, hx, hy) = self.height(a1 * depth - b1, a2 * depth - b2);
                 let slope = nd - hx * a1 - hy * a2;
@@ -295,7 +302,7 @@ impl Chart {
                 }
                 let step = (depth * nd - znz - h) / slope;
                 depth -= step.clamp(-0.3 * depth, 0.3 * depth);
-                if step.abs() < 1e-9 * depth {
+                if step.abs() < 1e-7 * depth {
                     break;
                 }
             }

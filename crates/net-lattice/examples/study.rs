@@ -1,0 +1,132 @@
+//! Errors on random flat nets from the simulator, and whether the covariance knows them.
+//!
+//!     cargo run --release -p net-lattice --example study -- [SCENES] [SEED]
+
+// Scenes will have more fields than are set here.
+#![allow(clippy::needless_update)]
+
+use net_geometry::nalgebra::{Rotation3, Vector2, Vector3, Vector6};
+use net_geometry::{Camera, Lens, Mesh};
+use net_image::Image;
+use net_lattice::{Config, LatticeEstimator};
+use net_sim::{Layer, NetPose, Scene, Sensor, Simulator, Twine, Water};
+
+struct Stream(u64);
+impl Stream {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    fn within(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+}
+
+fn quantile(values: &mut [f64], q: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(((values.len().max(1) - 1) as f64 * q).round() as usize).copied().unwrap_or(f64::NAN)
+}
+
+fn main() {
+    let arg = |k: usize, default: u64| std::env::args().nth(k).and_then(|a| a.parse().ok()).unwrap_or(default);
+    let (count, seed) = (arg(1, 50), arg(2, 1));
+    let camera = Camera::new(600.0, 600.0, 424.0, 240.0, 848, 480, Lens::None).expect("fixed and sound");
+    let mesh = Mesh::square(0.05).expect("fixed and sound");
+    let config = Config::default();
+    let mut estimator = LatticeEstimator::new(&camera, &mesh, &config).expect("defaults are valid");
+    let mut simulator = Simulator::new(camera);
+    let mut random = Stream(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut image = Image::default();
+    let (mut range, mut normal, mut xy, mut nees) = (vec![], vec![], vec![], vec![]);
+    let (mut refused, mut wrong) = (0, 0);
+    for k in 0..count {
+        for _ in 0..3 {
+            random.next();
+        }
+        let depth = (random.within(0.3f64.ln(), 6f64.ln())).exp();
+        let tilt = random.within(0.0, 60.0);
+        let azimuth = random.within(0.0, std::f64::consts::TAU);
+        let contrast = if random.next() < 0.5 { 60.0 } else { -60.0 };
+        let snr = (random.within(0.5f64.ln(), 6f64.ln())).exp();
+        let pose = NetPose {
+            range_m: depth,
+            tilt_x_deg: tilt * azimuth.cos(),
+            tilt_y_deg: tilt * azimuth.sin(),
+            roll_deg: random.within(-44.0, 44.0),
+            x_m: random.within(-0.025, 0.025),
+            y_m: random.within(-0.025, 0.025),
+        };
+        let mut layer = Layer::planar(&mesh, pose);
+        layer.net.twine = Twine { diameter_m: random.within(0.0015, 0.003), grey: 110.0 + contrast };
+        let scene = Scene {
+            layers: vec![layer],
+            water: Water { veil_grey: 110.0, ..Water::default() },
+            sensor: Sensor { psf_px: 0.7, read_noise_grey: contrast.abs() / snr, ..Sensor::default() },
+        };
+        let truth = match simulator.render(&scene, seed * 10_000 + k, &mut image) {
+            Ok(t) => t.layers[0].clone(),
+            Err(error) => {
+                eprintln!("{error}");
+                continue;
+            }
+        };
+        let Some(view) = image.view() else { continue };
+        let name = format!("{k:4} {depth:5.2} m tilt {tilt:4.1} snr {snr:4.2}");
+        let found = estimator.estimate(view).ok().flatten();
+        let Some(e) = found else {
+            println!("{name} nothing");
+            refused += 1;
+            continue;
+        };
+        let axis = truth.axis.expect("the axis meets an endless net");
+        let dr = 100.0 * (e.range / axis.range_m - 1.0);
+        let dn = axis.normal.angle(&e.pose.normal()).to_degrees();
+        // Truth in the estimate's labels: of the four quarter turns the nearest, of the nodes the nearest.
+        let turn = (0..4)
+            .map(|k| {
+                truth.pose.rotation
+                    * Rotation3::from_axis_angle(&Vector3::z_axis(), f64::from(k) * std::f64::consts::FRAC_PI_2)
+            })
+            .map(|r| (e.pose.rotation * r.inverse()).scaled_axis())
+            .min_by(|a, b| a.norm().total_cmp(&b.norm()))
+            .unwrap_or_default();
+        let o = truth.pose.inverse_transform(e.pose.translation);
+        let node = mesh.node((o.x / mesh.side1()).round(), (o.y / mesh.side2()).round());
+        let shift = e.pose.translation - truth.pose.transform(Vector3::new(node.x, node.y, 0.0));
+        let ok = e.probability >= config.probability_threshold;
+        let bad = dr.abs() > 5.0 || dn > 5.0;
+        let d = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+        let n = e.covariance.try_inverse().map_or(f64::NAN, |c| (d.transpose() * c * d)[0] / 6.0);
+        println!(
+            "{name} p {:.3} range {dr:8.4} % normal {dn:7.4} xy {:.3} mm nees {n:6.2} {:?} V {:.1} {:.1} V2 {:.1} {:.1} z {:.3}{}",
+            e.probability,
+            1e3 * Vector2::new(o.x - node.x, o.y - node.y).norm(),
+            e.model,
+            e.evidence.v[0],
+            e.evidence.v[1],
+            e.evidence.v2[0],
+            e.evidence.v2[1],
+            e.range,
+            match (ok, bad) {
+                (true, true) => " WRONG",
+                (false, true) => " refused, wrong",
+                (false, false) => " refused",
+                _ => "",
+            }
+        );
+        if !ok {
+            refused += 1;
+        } else if bad {
+            wrong += 1;
+        } else {
+            range.push(dr.abs());
+            normal.push(dn);
+            xy.push(1e3 * Vector2::new(o.x - node.x, o.y - node.y).norm());
+            nees.push(n);
+        }
+    }
+    println!("{} scenes: right {}, wrong claims {wrong}, refused {refused}", count, range.len());
+    for (name, v) in [("range %", &mut range), ("normal deg", &mut normal), ("xy mm", &mut xy), ("nees/6", &mut nees)] {
+        println!("{name:12} median {:.4}  95th percentile {:.4}", quantile(v, 0.5), quantile(v, 0.95));
+    }
+}
