@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use net_image::Image;
 
+use crate::message::ImageType;
 use crate::picture;
 
 /// Why one frame can't be used. The log goes on behind it.
@@ -97,6 +98,13 @@ pub struct RawFrame {
 pub(crate) enum Payload {
     /// An image file, not opened yet.
     File(PathBuf),
+    /// A message.
+    Message {
+        /// What it is.
+        kind: ImageType,
+        /// Its bytes.
+        data: Vec<u8>,
+    },
     /// Already known not to be usable.
     Refused(FrameError),
 }
@@ -109,6 +117,7 @@ impl RawFrame {
     pub fn decode(&self) -> Result<Image<u8>, FrameError> {
         match &self.payload {
             Payload::File(path) => read_image(path),
+            Payload::Message { kind, data } => kind.decode(data),
             Payload::Refused(error) => Err(error.clone()),
         }
     }

@@ -1,5 +1,21 @@
-//! Writers of results.
+//! Writers of results, and readers of what they wrote.
 
+mod annotated;
+mod image_log;
+mod junctions;
 mod poses;
+mod poses_reader;
+mod report;
+mod run;
+mod summary;
+mod trajectory;
 
-pub use poses::{NetColumns, POSES_HEADER, PoseRow, PosesCsv, Resumed, RowStatus, read_poses};
+pub use annotated::{AnnotatedMcap, DEFAULT_CAMERA_FRAME};
+pub use image_log::{CAMERA_YAML, ImageFolderWriter, ImageMcapWriter, png, write_camera_yaml};
+pub use junctions::{Junctions, JunctionsParquet, read_junctions};
+pub use poses::{NetColumns, POSES_HEADER, PoseRow, PosesCsv, Resumed, RowStatus};
+pub use poses_reader::{PoseRows, read_poses};
+pub use report::{Example, write_report};
+pub use run::{RunFiles, RunPaths};
+pub use summary::{LogSummary, RunSummary, Timing, TimingHistogram, UnreadableFrame};
+pub use trajectory::TrajectoryTum;

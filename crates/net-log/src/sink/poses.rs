@@ -1,20 +1,21 @@
 //! `poses.csv`: one row per frame of the log, in its order.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Read, Seek, SeekFrom};
+use std::io::{BufWriter, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use net_geometry::Pose;
-use net_geometry::nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use net_geometry::nalgebra::Vector3;
 
 use crate::error::{Error, Result};
+use crate::sink::poses_reader::PoseRows;
 
 /// The columns that every `poses.csv` has, in this order. More may follow them.
 pub const POSES_HEADER: &str = "frame,file,timestamp_ns,status,probability,range_m,distance_m,normal_x,normal_y,normal_z,\
                                 tx,ty,tz,qw,qx,qy,qz,sigma_range_m,sigma_tilt_deg,sigma_xy_m,junctions,latency_ms";
 
 /// Number of columns in [`POSES_HEADER`].
-const COLUMNS: usize = 22;
+pub(super) const COLUMNS: usize = 22;
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -185,27 +186,31 @@ impl PosesCsv {
     /// # Errors
     /// [`Error::Table`] if the columns are others, or a row can't be read; [`Error::Io`] names the path.
     pub fn resume(path: &Path, appended: &[&str]) -> Result<(Self, Resumed)> {
-        let Some(text) = complete_lines(path)? else {
-            return Ok((Self::create(path, appended)?, Resumed { rows: 0, last_frame: None }));
+        Self::resume_behind(path, appended, u64::MAX)
+    }
+
+    /// As [`PosesCsv::resume`], keeping no more than the first `most` rows.
+    pub(crate) fn resume_behind(path: &Path, appended: &[&str], most: u64) -> Result<(Self, Resumed)> {
+        let nothing = Resumed { rows: 0, last_frame: None };
+        let Some(mut rows) = PoseRows::open(path)? else {
+            return Ok((Self::create(path, appended)?, nothing));
         };
-        let header: String =
-            std::iter::once(POSES_HEADER).chain(appended.iter().copied()).collect::<Vec<_>>().join(",");
-        let found = text.lines().next().unwrap_or_default().trim_end();
-        if found != header {
-            let why = format!(
-                "the columns are not those of this version, so the run can't be resumed; they should be {header}"
-            );
+        if !rows.header().iter().eq(POSES_HEADER.split(',').chain(appended.iter().copied())) {
+            let header: Vec<&str> = std::iter::once(POSES_HEADER).chain(appended.iter().copied()).collect();
+            let why = format!("the columns are not those of this version, which are {}", header.join(","));
             return Err(Error::Table { path: path.to_owned(), line: 1, why });
         }
-        let (mut rows, mut last_frame) = (0, None);
-        for row in parse(path, &text)? {
-            rows += 1;
-            last_frame = Some(row.frame);
+        let mut resumed = nothing;
+        while resumed.rows < most
+            && let Some(row) = rows.next()
+        {
+            resumed = Resumed { rows: resumed.rows + 1, last_frame: Some(row?.frame) };
         }
-        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(Error::io("write", path))?;
-        file.set_len(text.len() as u64).map_err(Error::io("write", path))?;
+        let end = rows.position();
+        let mut file = OpenOptions::new().write(true).open(path).map_err(Error::io("write", path))?;
+        file.set_len(end).map_err(Error::io("write", path))?;
         file.seek(SeekFrom::End(0)).map_err(Error::io("write", path))?;
-        Ok((Self::over(path, file, appended.len()), Resumed { rows, last_frame }))
+        Ok((Self::over(path, file, appended.len()), resumed))
     }
 
     fn over(path: &Path, file: File, appended: usize) -> Self {
@@ -232,93 +237,4 @@ impl PosesCsv {
             other => std::io::Error::other(format!("{other:?}")),
         })
     }
-}
-
-/// Reads a `poses.csv`, or a truth file of the same columns. A last line that was never finished is left out.
-///
-/// # Errors
-/// [`Error::Table`] names the line, [`Error::Io`] the path.
-pub fn read_poses(path: &Path) -> Result<Vec<PoseRow>> {
-    match complete_lines(path)? {
-        Some(text) => parse(path, &text),
-        None => Err(Error::Table { path: path.to_owned(), line: 1, why: "the file is missing or empty".to_owned() }),
-    }
-}
-
-/// The file up to its last line feed; `None` if there is no such file or no complete line in it.
-fn complete_lines(path: &Path) -> Result<Option<String>> {
-    let mut bytes = Vec::new();
-    match File::open(path).and_then(|mut f| f.read_to_end(&mut bytes)) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        other => other.map_err(Error::io("read", path))?,
-    };
-    let Some(end) = bytes.iter().rposition(|&b| b == b'\n') else { return Ok(None) };
-    bytes.truncate(end + 1);
-    let why = "it is not text in UTF-8".to_owned();
-    String::from_utf8(bytes).map(Some).map_err(|_| Error::Table { path: path.to_owned(), line: 1, why })
-}
-
-fn parse(path: &Path, text: &str) -> Result<Vec<PoseRow>> {
-    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
-    let at = |line: u64, why: String| Error::Table { path: path.to_owned(), line, why };
-    let header = reader.headers().map_err(|e| at(1, e.to_string()))?;
-    if !header.iter().take(COLUMNS).eq(POSES_HEADER.split(',')) {
-        return Err(at(1, format!("the first columns must be {POSES_HEADER}")));
-    }
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| at(e.position().map_or(0, csv::Position::line), e.to_string()))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        rows.push(parse_row(&record).map_err(|why| at(line, why))?);
-    }
-    Ok(rows)
-}
-
-fn parse_row(record: &csv::StringRecord) -> std::result::Result<PoseRow, String> {
-    let cell = |i: usize| record.get(i).ok_or_else(|| format!("{} columns of {COLUMNS}", record.len()));
-    let float = |i: usize| -> std::result::Result<Option<f64>, String> {
-        match cell(i)? {
-            "" => Ok(None),
-            text => text.parse().map(Some).map_err(|_| format!("{text:?} is not a number")),
-        }
-    };
-    let integer = |i: usize| -> std::result::Result<Option<u64>, String> {
-        match cell(i)? {
-            "" => Ok(None),
-            text => text.parse().map(Some).map_err(|_| format!("{text:?} is not a whole number")),
-        }
-    };
-    let status = cell(3)?.parse().map_err(|()| format!("status {:?} is none of ok, no_net, unreadable", cell(3)))?;
-    let net = if status == RowStatus::Ok {
-        let need =
-            |i: usize| float(i)?.filter(|v| v.is_finite()).ok_or_else(|| format!("no number in column {}", i + 1));
-        let q = Quaternion::new(need(13)?, need(14)?, need(15)?, need(16)?);
-        let rotation = UnitQuaternion::try_new(q, 1e-6).ok_or("the quaternion is zero")?.to_rotation_matrix();
-        Some(NetColumns {
-            range_m: need(5)?,
-            distance_m: need(6)?,
-            normal: Vector3::new(need(7)?, need(8)?, need(9)?),
-            pose: Pose { rotation, translation: Vector3::new(need(10)?, need(11)?, need(12)?) },
-            sigma_range_m: float(17)?.unwrap_or(f64::NAN),
-            sigma_tilt_deg: float(18)?.unwrap_or(f64::NAN),
-            sigma_xy_m: float(19)?.unwrap_or(f64::NAN),
-        })
-    } else {
-        None
-    };
-    let timestamp = cell(2)?;
-    let time = || timestamp.parse().map_err(|_| format!("{timestamp:?} is not a time in ns"));
-    Ok(PoseRow {
-        frame: integer(0)?.ok_or("no frame number")?,
-        file: cell(1)?.to_owned(),
-        timestamp_ns: if timestamp.is_empty() { None } else { Some(time()?) },
-        status,
-        probability: float(4)?,
-        net,
-        junctions: integer(20)?,
-        latency_ms: float(21)?,
-        appended: (COLUMNS..record.len())
-            .map(|i| Ok(float(i)?.unwrap_or(f64::NAN)))
-            .collect::<std::result::Result<_, String>>()?,
-    })
 }

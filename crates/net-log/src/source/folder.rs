@@ -8,7 +8,7 @@ use crate::frame::{FrameError, Payload, RawFrame};
 use crate::log::{LogInfo, LogKind, OpenOptions, TimeSource};
 use crate::picture;
 use crate::source::timestamps::TIMESTAMPS_CSV;
-use crate::source::{Source, natural, timestamps};
+use crate::source::{Source, first_bytes, natural, timestamps};
 
 /// Endings that make a file a frame, whatever is in it: if it is no picture, it is an unreadable frame, not a stray file.
 const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "jpe", "tif", "tiff", "bmp", "webp"];
@@ -118,8 +118,5 @@ fn image_names(path: &Path) -> Result<Vec<String>> {
 
 /// Looks at the first bytes of a file of unknown ending; one that can't be read is none of ours.
 fn begins_like_an_image(path: &Path) -> bool {
-    use std::io::Read;
-    let mut first = [0; 12];
-    let read = std::fs::File::open(path).and_then(|mut f| f.read(&mut first));
-    read.is_ok_and(|n| picture::sniff(&first[..n]).is_some())
+    first_bytes(path).is_ok_and(|first| picture::sniff(&first).is_some())
 }

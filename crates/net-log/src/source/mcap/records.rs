@@ -1,0 +1,205 @@
+//! The records of one MCAP file from front to back, whatever is broken in it.
+//!
+//! The file is read once, forwards, chunk by chunk, so that memory does not grow with it. A chunk is handed to the `mcap` crate's
+//! reader by itself: one that is broken costs its own messages only, and the next one starts afresh.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use mcap::records::{Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::error::{Error, Result};
+use crate::source::mcap::survey::Place;
+
+/// Largest record that is read, bytes: 100 Mpx of four channels.
+const MAX_RECORD: usize = 400 << 20;
+/// Most that is asked of the file at once, bytes.
+const READ_SIZE: u64 = 1 << 20;
+/// Opcode and length of a record, bytes.
+const RECORD_HEADER: u64 = 9;
+
+/// What a step through the file found.
+pub(super) enum Event<'a> {
+    /// A message type.
+    Schema { id: u16, name: String },
+    /// A topic.
+    Channel { id: u16, schema: u16, topic: String, encoding: String },
+    /// A message; one in a chunk is to be trusted once the chunk has ended well.
+    Message { channel: u16, log_time: u64, data: &'a [u8], in_chunk: bool },
+    /// The chunk is over; its checksum was right, or why its messages can't be trusted.
+    ChunkEnd(std::result::Result<(), String>),
+}
+
+/// One file being read.
+pub(super) struct Records {
+    name: String,
+    file: BufReader<File>,
+    length: u64,
+    /// Where the next record outside of chunks begins, byte.
+    position: u64,
+    chunk: Option<Chunk>,
+    /// Chunks by their first byte, from the summary: where to go on behind damage. Empty without a summary.
+    places: BTreeMap<u64, Place>,
+    /// What is wrong with the file.
+    damage: Vec<String>,
+    ended: bool,
+}
+
+/// The chunk being read.
+struct Chunk {
+    reader: LinearReader,
+    /// Bytes of it that are still in the file.
+    remaining: u64,
+    /// Whether the file ends inside of it.
+    cut_off: bool,
+}
+
+impl Records {
+    /// Opens a file; `places` comes from its summary, if it has one.
+    pub(super) fn open(path: &Path, places: BTreeMap<u64, Place>) -> Result<Self> {
+        let file = File::open(path).map_err(Error::io("read", path))?;
+        let length = file.metadata().map_err(Error::io("read", path))?.len();
+        let mut file = BufReader::with_capacity(64 << 10, file);
+        let mut magic = [0; 8];
+        let is_mcap = file.read_exact(&mut magic).is_ok() && magic == mcap::MAGIC;
+        if !is_mcap {
+            let why = if length == 0 { "it is empty" } else { "it does not begin as an MCAP file does" };
+            return Err(Error::NotALog { path: path.to_owned(), why: why.to_owned() });
+        }
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let position = magic.len() as u64;
+        Ok(Self { name, file, length, position, chunk: None, places, damage: Vec::new(), ended: false })
+    }
+
+    /// What is wrong with the file, as far as it has been read.
+    pub(super) fn take_damage(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.damage)
+    }
+
+    /// Goes one step on and shows what it found, if anything. `false` at the end of the file.
+    pub(super) fn step(&mut self, visit: &mut dyn FnMut(Event<'_>)) -> bool {
+        if self.ended {
+            return false;
+        }
+        let step = if self.chunk.is_some() { self.step_in_chunk(visit) } else { self.step_outside(visit) };
+        if let Err(error) = step {
+            self.damage.push(format!("{}: cannot read on from byte {}: {error}", self.name, self.position));
+            self.ended = true;
+        }
+        true
+    }
+
+    fn step_in_chunk(&mut self, visit: &mut dyn FnMut(Event<'_>)) -> std::io::Result<()> {
+        let Some(chunk) = &mut self.chunk else { return Ok(()) };
+        let sound = match chunk.reader.next_event() {
+            Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
+                let size = (wanted.max(1) as u64).min(chunk.remaining).min(READ_SIZE) as usize;
+                let read = self.file.read(chunk.reader.insert(size))?;
+                chunk.reader.notify_read(read);
+                chunk.remaining -= read as u64;
+                return Ok(());
+            }
+            Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                show(opcode, data, true, visit);
+                return Ok(());
+            }
+            None => Ok(()),
+            // Of a chunk that is cut off, what came out of it before its end is good.
+            Some(Err(_)) if chunk.cut_off => Ok(()),
+            Some(Err(error)) => Err(format!("the chunk at byte {} is damaged: {error}", self.position)),
+        };
+        if chunk.cut_off {
+            self.damage.push(format!("{}: cut off at byte {}, inside of a chunk", self.name, self.length));
+            self.ended = true;
+        }
+        if let Err(why) = &sound {
+            self.damage.push(format!("{}: {why}", self.name));
+        }
+        visit(Event::ChunkEnd(sound));
+        self.position = self.file.seek(SeekFrom::Current(chunk.remaining as i64))?;
+        self.chunk = None;
+        Ok(())
+    }
+
+    fn step_outside(&mut self, visit: &mut dyn FnMut(Event<'_>)) -> std::io::Result<()> {
+        let left = self.length.saturating_sub(self.position);
+        if left < RECORD_HEADER {
+            let how = if left == 0 { "its end is missing" } else { "cut off inside of a record" };
+            self.damage.push(format!("{}: {how}, at byte {}", self.name, self.length));
+            self.ended = true;
+            return Ok(());
+        }
+        let mut header = [0; RECORD_HEADER as usize];
+        self.file.read_exact(&mut header)?;
+        let opcode = header[0];
+        let mut length = [0; 8];
+        length.copy_from_slice(&header[1..]);
+        let (length, left) = (u64::from_le_bytes(length), left - RECORD_HEADER);
+        let cut_off = length > left;
+        match opcode {
+            op::CHUNK if self.places.get(&self.position).is_some_and(|p| p.skip) && !cut_off => self.skip(length)?,
+            op::CHUNK => {
+                let options = LinearReaderOptions::default()
+                    .with_skip_start_magic(true)
+                    .with_skip_end_magic(true)
+                    .with_validate_chunk_crcs(true)
+                    .with_record_length_limit(MAX_RECORD);
+                let mut reader = LinearReader::new_with_options(options);
+                reader.insert(header.len()).copy_from_slice(&header);
+                reader.notify_read(header.len());
+                self.chunk = Some(Chunk { reader, remaining: length.min(left), cut_off });
+            }
+            op::DATA_END | op::FOOTER => self.ended = true,
+            _ if cut_off => self.resume_behind(format!("cut off at byte {}, inside of a record", self.length))?,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE if length <= MAX_RECORD as u64 => {
+                let mut body = vec![0; length as usize];
+                self.file.read_exact(&mut body)?;
+                self.position += RECORD_HEADER + length;
+                show(opcode, &body, false, visit);
+            }
+            op::HEADER | op::MESSAGE_INDEX..=op::SUMMARY_OFFSET | 0x80.. => self.skip(length)?,
+            _ => self.resume_behind(format!("no record at byte {}", self.position))?,
+        }
+        Ok(())
+    }
+
+    /// Passes over the body of a record.
+    fn skip(&mut self, length: u64) -> std::io::Result<()> {
+        // A record lies within the file, so its length fits.
+        self.file.seek_relative(length as i64)?;
+        self.position += RECORD_HEADER + length;
+        Ok(())
+    }
+
+    /// Notes damage and goes on with the next chunk that the summary knows; ends if there is none.
+    fn resume_behind(&mut self, why: String) -> std::io::Result<()> {
+        self.damage.push(format!("{}: {why}", self.name));
+        match self.places.range(self.position + 1..).next() {
+            Some((&start, _)) if start < self.length => {
+                self.position = self.file.seek(SeekFrom::Start(start))?;
+            }
+            _ => self.ended = true,
+        }
+        Ok(())
+    }
+}
+
+/// Shows a record, if it is of a kind that matters. One that does not parse is passed over: a chunk's checksum has the last word.
+fn show(opcode: u8, body: &[u8], in_chunk: bool, visit: &mut dyn FnMut(Event<'_>)) {
+    if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+        return;
+    }
+    match mcap::parse_record(opcode, body) {
+        Ok(Record::Schema { header, .. }) => visit(Event::Schema { id: header.id, name: header.name }),
+        Ok(Record::Channel(c)) => {
+            visit(Event::Channel { id: c.id, schema: c.schema_id, topic: c.topic, encoding: c.message_encoding });
+        }
+        Ok(Record::Message { header, data }) => {
+            visit(Event::Message { channel: header.channel_id, log_time: header.log_time, data: &data, in_chunk });
+        }
+        _ => {}
+    }
+}

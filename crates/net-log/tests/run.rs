@@ -1,0 +1,323 @@
+//! The folder of a run: whole at any moment, the same whether it was stopped or not; and the logs that are written read back.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::path::Path;
+
+use net_geometry::nalgebra::{Rotation3, Vector2, Vector3};
+use net_geometry::{Camera, Junction, JunctionState, Lens, Pose};
+use net_log::{
+    DEFAULT_CAMERA_FRAME, Example, ImageFolderWriter, ImageMcapWriter, JunctionsParquet, NetColumns, OpenOptions,
+    PoseRow, RowStatus, RunFiles, RunSummary, open, read_camera, read_junctions, read_poses, write_camera_yaml,
+    write_report,
+};
+use proptest::prelude::*;
+use support::{picture, png};
+
+const START: i64 = 1_700_000_000_000_000_000;
+
+fn camera(lens: Lens) -> Camera {
+    Camera::new(420.5, 421.25, 423.0, 239.125, 848, 480, lens).unwrap()
+}
+
+/// `count` junctions, named but for every seventh.
+fn junctions(frame: u64, count: usize) -> Vec<Junction> {
+    let states = [JunctionState::Seen, JunctionState::Hidden, JunctionState::Fouled, JunctionState::Missing];
+    let junction = |n: usize| Junction {
+        pixel: Vector2::new(frame as f64 + n as f64 / 3.0, -1.5 * n as f64),
+        index: (!n.is_multiple_of(7)).then_some((n as i32 - 5, frame as i32)),
+        sigma_px: 0.01 * n as f64,
+        state: states[n % 4],
+    };
+    (0..count).map(junction).collect()
+}
+
+/// A run of frames of every status.
+fn frame(index: u64) -> (PoseRow, Vec<Junction>) {
+    let row = PoseRow::unreadable(index, &format!("{index}.png"), Some(START + index as i64 * 100_000_000));
+    let (rotation, depth) = (Rotation3::from_euler_angles(0.01 * index as f64, 0.2, -0.3), 1.0 + 0.1 * index as f64);
+    let pose = Pose { rotation, translation: Vector3::new(0.1, 0.2, depth) };
+    let found = junctions(index, (index as usize * 13) % 40);
+    let measured = PoseRow {
+        junctions: Some(found.len() as u64),
+        latency_ms: Some(3.0 + index as f64),
+        probability: Some(0.5),
+        ..row.clone()
+    };
+    match index % 5 {
+        3 => (PoseRow { junctions: Some(0), status: RowStatus::NoNet, ..measured }, vec![]),
+        4 => (row, vec![]),
+        _ => {
+            let net = NetColumns {
+                range_m: pose.plane().range().unwrap(),
+                distance_m: pose.plane().distance,
+                normal: pose.normal(),
+                pose,
+                sigma_range_m: 0.001,
+                sigma_tilt_deg: 0.1,
+                sigma_xy_m: 0.002,
+            };
+            (PoseRow { status: RowStatus::Ok, net: Some(net), ..measured }, found)
+        }
+    }
+}
+
+fn write(files: &mut RunFiles, frames: std::ops::Range<u64>) {
+    for index in frames {
+        let (row, junctions) = frame(index);
+        files.write(&row, &junctions).unwrap();
+    }
+}
+
+/// Contents of all files that a run has, junctions as rows.
+fn contents(dir: &Path) -> (String, String, Vec<(u64, Vec<Junction>)>) {
+    let text = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
+    let junctions = read_junctions(&dir.join("junctions.parquet")).unwrap().map(Result::unwrap).collect();
+    (text("poses.csv"), text("trajectory.tum"), junctions)
+}
+
+#[test]
+fn junctions_read_back_frame_by_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("junctions.parquet");
+    let mut writer = JunctionsParquet::create(&path).unwrap();
+    assert_eq!(read_junctions(&path).unwrap().count(), 0, "whole, and empty, at once");
+    // Enough for several groups, by rows and by frames, with frames that have none.
+    let count = |frame: u64| {
+        if frame.is_multiple_of(3) {
+            0
+        } else if frame < 60 {
+            1200
+        } else {
+            2
+        }
+    };
+    let mut seen = 0;
+    for frame in 0..1000 {
+        writer.write(frame, &junctions(frame, count(frame))).unwrap();
+        if frame % 100 == 99 {
+            // Read while it is written: what a killed process would have left.
+            let frames: Vec<_> = read_junctions(&path).unwrap().map(Result::unwrap).collect();
+            assert!(frames.len() >= seen);
+            seen = frames.len();
+            assert!(frames.iter().all(|(f, found)| *found == junctions(*f, count(*f))));
+        }
+    }
+    assert!(seen > 200, "{seen} frames before the end");
+    writer.finish().unwrap();
+    let mut expected = (0..1000).filter(|f: &u64| !f.is_multiple_of(3));
+    for frame in read_junctions(&path).unwrap() {
+        let (number, found) = frame.unwrap();
+        assert_eq!(Some(number), expected.next());
+        assert_eq!(found, junctions(number, count(number)));
+    }
+    assert_eq!(expected.next(), None);
+    // 23,778 + 1,260 rows of 45 bytes and less: the footers in between do not count.
+    assert!(std::fs::metadata(&path).unwrap().len() < 1_500_000);
+}
+
+#[test]
+fn what_may_not_be_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+    let (row, _) = frame(1);
+    let text = files.write(&row, &junctions(1, 2)).unwrap_err().to_string();
+    assert!(text.contains("Some(13) in the row and 2 in the list"), "{text}");
+    let mut nan = junctions(1, 13);
+    nan[3].pixel.x = f64::NAN;
+    assert!(files.write(&row, &nan).unwrap_err().to_string().contains("junction is (NaN, "));
+    let file = dir.path().join("a file");
+    std::fs::write(&file, "").unwrap();
+    let text = RunFiles::create(&file, &[]).unwrap_err().to_string();
+    assert!(text.starts_with("cannot create ") && text.contains("a file"), "{text}");
+    let text = RunFiles::create(Path::new("/proc/netpose"), &[]).unwrap_err().to_string();
+    assert!(text.starts_with("cannot create /proc/netpose: "), "{text}");
+}
+
+#[test]
+fn a_new_run_leaves_nothing_of_an_old_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |frames: u64| {
+        let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+        write(&mut files, 0..frames);
+        files
+    };
+    run(20).finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+    assert!(dir.path().join("annotated.mcap").exists());
+    drop(run(2));
+    assert!(!dir.path().join("annotated.mcap").exists());
+    assert_eq!(read_poses(&dir.path().join("poses.csv")).unwrap().len(), 2);
+}
+
+#[test]
+fn annotations_meet_their_images() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+    write(&mut files, 0..10);
+    files.finish(&camera(Lens::KannalaBrandt([0.1; 4])), "front_optical").unwrap();
+    let bytes = std::fs::read(dir.path().join("annotated.mcap")).unwrap();
+    let mut times = std::collections::BTreeMap::<String, Vec<u64>>::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!((schema.encoding.as_str(), message.channel.message_encoding.as_str()), ("protobuf", "protobuf"));
+        times.entry(format!("{} {}", message.channel.topic, schema.name)).or_default().push(message.log_time);
+    }
+    let all: Vec<u64> = (0..10).map(|i| START as u64 + i * 100_000_000).collect();
+    let posed: Vec<u64> = all.iter().copied().enumerate().filter(|(i, _)| i % 5 < 3).map(|(_, t)| t).collect();
+    let expected = [
+        ("/netpose/annotations foxglove.ImageAnnotations", all.clone()),
+        ("/netpose/calibration foxglove.CameraCalibration", vec![all[0]]),
+        ("/netpose/estimate netpose.Estimate", all.clone()),
+        ("/netpose/pose foxglove.PoseInFrame", posed.clone()),
+        ("/netpose/transform foxglove.FrameTransform", posed),
+    ];
+    assert_eq!(times.into_iter().collect::<Vec<_>>(), expected.map(|(k, v)| (k.to_owned(), v)));
+    // Our own reader understands the calibration, and that there are no images.
+    let text = open(&dir.path().join("annotated.mcap"), &OpenOptions::default()).unwrap_err().to_string();
+    assert!(text.contains("none of its topics holds images"), "{text}");
+    let info = net_log::inspect(&dir.path().join("annotated.mcap"), &OpenOptions::default()).unwrap();
+    assert_eq!(info.camera.unwrap().camera.unwrap(), camera(Lens::KannalaBrandt([0.1; 4])));
+}
+
+#[test]
+fn the_report_is_one_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+    write(&mut files, 0..40);
+    let mut summary = RunSummary { version: "9.8.7".to_owned(), ..RunSummary::default() };
+    summary.log.path = "a log <with> \"signs\" & such".to_owned();
+    summary.log.times = "made up, 10 frames per second".to_owned();
+    summary.log.damage = vec!["x.mcap: cut off at byte 12, inside of a chunk".to_owned()];
+    summary.name_unreadable(4, "4.png", &"PNG: unexpected end");
+    let example = Example { caption: "frame 7".to_owned(), png: png(&picture(8, 8, 0)) };
+    write_report(files.paths(), &summary, &[example]).unwrap();
+    let page = std::fs::read_to_string(dir.path().join("report.html")).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    assert_eq!(page.matches("<svg").count(), 5);
+    for part in [
+        "9.8.7",
+        "4.png",
+        "unexpected end",
+        "Times are made up",
+        "byte 12",
+        "data:image/png;base64,iVBOR",
+        "24 (60.0 %)",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Names are text, and nothing is fetched from elsewhere.
+    assert!(!page.contains("<with>") && !page.contains("src=\"http") && !page.contains("href="));
+    // A run without a single frame has a page too.
+    RunFiles::create(dir.path(), &[]).unwrap();
+    write_report(files.paths(), &RunSummary::default(), &[]).unwrap();
+}
+
+#[test]
+fn logs_that_are_written_read_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, file) = (dir.path().join("folder"), dir.path().join("log.mcap"));
+    let truth = camera(Lens::Rational([0.1, -0.2, 1e-3, 0.0, 0.3, 1.0, 2.0, 3.5]));
+    let mut images = ImageFolderWriter::create(&folder, &truth).unwrap();
+    let mut mcap = ImageMcapWriter::create(&file, &truth).unwrap();
+    let pictures: Vec<_> = (0..5).map(|i| picture(20, 10, i)).collect();
+    for (i, p) in pictures.iter().enumerate() {
+        let time = START + i as i64 * 33_333_333;
+        images.write(&format!("frame_{i}.png"), time, p.view().unwrap()).unwrap();
+        mcap.write(time, p.view().unwrap()).unwrap();
+    }
+    mcap.finish().unwrap();
+    assert_eq!(read_camera(&folder.join("camera.yaml")).unwrap(), truth);
+    for path in [&folder, &file] {
+        let log = open(path, &OpenOptions::default()).unwrap();
+        if path == &file {
+            let found = log.info().camera.as_ref().unwrap();
+            assert_eq!((found.topic.as_str(), found.camera.as_ref().unwrap()), ("/camera/camera_info", &truth));
+        }
+        for (i, frame) in log.enumerate() {
+            assert_eq!(frame.timestamp_ns, Some(START + i as i64 * 33_333_333));
+            assert_eq!(frame.decode().unwrap(), pictures[i]);
+        }
+    }
+    // Encoded images too; and times that ROS cannot tell are refused.
+    let mut mcap = ImageMcapWriter::create(&file, &truth).unwrap();
+    mcap.write_encoded(START, "png", &png(&pictures[3])).unwrap();
+    assert!(mcap.write(-1, pictures[0].view().unwrap()).unwrap_err().to_string().contains("timestamp_ns is -1"));
+    mcap.finish().unwrap();
+    let mut log = open(&file, &OpenOptions::default()).unwrap();
+    assert_eq!(log.info().topic.as_deref(), Some("/camera/image_raw/compressed"));
+    assert_eq!(log.next().unwrap().decode().unwrap(), pictures[3]);
+    for lens in [Lens::None, Lens::PlumbBob([0.1, 0.0, -1e-9, 3.0, 7.0]), Lens::KannalaBrandt([0.1, 0.2, 0.3, 0.4])] {
+        let path = dir.path().join("camera.yaml");
+        write_camera_yaml(&path, &camera(lens)).unwrap();
+        // A pinhole is written as a lens that bends nothing.
+        let lens = if lens == Lens::None { Lens::PlumbBob([0.0; 5]) } else { lens };
+        assert_eq!(read_camera(&path).unwrap(), camera(lens));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// A run that is stopped after any frame, by a signal (its files closed) or by force (not closed), and whose files then lose any
+    /// number of bytes at their ends, goes on to the same results as one that was never stopped.
+    #[test]
+    fn stopped_anywhere(stop in 0..60_u64, closed: bool, lost in prop::collection::vec(0..300_u64, 3), grouped: bool) {
+        let (whole, torn) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let mut files = RunFiles::create(whole.path(), &[]).unwrap();
+        write(&mut files, 0..60);
+        files.finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+
+        let mut files = RunFiles::create(torn.path(), &[]).unwrap();
+        write(&mut files, 0..stop);
+        if closed {
+            files.finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+        } else {
+            drop(files);
+        }
+        for (name, lost) in ["poses.csv", "trajectory.tum", "junctions.parquet"].iter().zip(&lost) {
+            let file = std::fs::OpenOptions::new().write(true).open(torn.path().join(name)).unwrap();
+            let length = file.metadata().unwrap().len();
+            file.set_len(length.saturating_sub(if grouped { *lost } else { 0 })).unwrap();
+        }
+        let (mut files, rows) = RunFiles::resume(torn.path(), &[]).unwrap();
+        prop_assert!(rows.len() as u64 <= stop);
+        for (index, row) in rows.iter().enumerate() {
+            prop_assert_eq!((row.frame, row.status), (index as u64, frame(index as u64).0.status));
+        }
+        if closed && !grouped {
+            prop_assert_eq!(rows.len() as u64, stop, "nothing is done twice");
+        }
+        write(&mut files, rows.len() as u64..60);
+        files.finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+        prop_assert_eq!(contents(torn.path()), contents(whole.path()));
+        let annotated = |dir: &Path| std::fs::read(dir.join("annotated.mcap")).unwrap();
+        prop_assert_eq!(annotated(torn.path()), annotated(whole.path()));
+        let names = |dir: &Path| std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name()).collect::<std::collections::BTreeSet<_>>();
+        prop_assert_eq!(names(torn.path()), names(whole.path()));
+    }
+
+    /// Any bytes: an error, or junctions; never a panic.
+    #[test]
+    fn any_bytes_of_junctions(cut in 0.0..1.1f64, changes in prop::collection::vec((0.0..1.0f64, any::<u8>()), 0..5)) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("junctions.parquet");
+        let mut writer = JunctionsParquet::create(&path).unwrap();
+        (0..4).for_each(|f| writer.write(f, &junctions(f, 20)).unwrap());
+        writer.finish().unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        for (at, byte) in changes {
+            let at = (at * bytes.len() as f64) as usize;
+            bytes[at] = byte;
+        }
+        bytes.truncate((cut * bytes.len() as f64) as usize);
+        std::fs::write(&path, bytes).unwrap();
+        if let Ok(frames) = read_junctions(&path) {
+            // What reads without an error has all its parts.
+            for (_, found) in frames.map_while(Result::ok) {
+                prop_assert!(!found.is_empty());
+            }
+        }
+    }
+}
