@@ -42,13 +42,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut out = String::from("frame,point,u,v,state,status\n");
     let mut ids = 0;
     let (mut started, mut tracked, mut ambiguous, mut lost) = (0, 0, 0, 0);
-    let mut time = 0.0;
+    let (mut time, mut cpu) = (0.0, 0.0);
     let mut points = 0;
     for (k, frame) in frames.iter().enumerate() {
         let view = frame.view().ok_or("an empty picture")?;
-        let begin = Instant::now();
+        let (begin, cpu_begin) = (Instant::now(), cpu_seconds());
         let result = tracker.update(view, &Hints::default())?;
         time += begin.elapsed().as_secs_f64();
+        cpu += cpu_seconds() - cpu_begin;
         points += result.tracks.len();
         match result.step.status {
             Status::Started => started += 1,
@@ -93,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     errors.sort_by(f64::total_cmp);
     let at = |q: f64| errors.get((q * (errors.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN);
     eprintln!(
-        "{} frames, {} of {} points left: error median {:.3} p90 {:.3} max {:.3} px; steps {started} started {tracked} tracked {ambiguous} ambiguous {lost} lost; {:.2} ms a frame, {} points a frame",
+        "{} frames, {} of {} points left: error median {:.3} p90 {:.3} max {:.3} px; steps {started} started {tracked} tracked {ambiguous} ambiguous {lost} lost; {:.2} ms, {:.2} ms CPU a frame, {} points a frame",
         frames.len(),
         errors.len(),
         truth[0].len(),
@@ -101,9 +102,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         at(0.9),
         at(1.0),
         1e3 * time / frames.len() as f64,
+        1e3 * cpu / frames.len() as f64,
         points / frames.len()
     );
     Ok(())
+}
+
+/// Time that this thread has had of a processor, s, where the system tells (Linux); else 0.
+fn cpu_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split_whitespace().next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9
 }
 
 /// Points of each frame.

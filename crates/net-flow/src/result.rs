@@ -48,8 +48,8 @@ impl Estimate<'_> {
 /// What an update tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowResult<'a> {
-    /// How far the tracks' positions can be relied on as positions of the points seeded: worst of all steps since the key frame,
-    /// unless a direct match with the key frame has settled it.
+    /// How far `from_key` can be relied on: the worst of all steps since the key frame, unless a direct match with it has settled
+    /// their doubts.
     pub status: Status,
     /// Number of this frame, from 0.
     pub frame: u64,

@@ -22,7 +22,7 @@ const MAX_Z: f64 = 10.0;
 
 /// Standard deviation of differences that all points share though the net is perfectly regular, in units of correlation: light that stays with the
 /// camera, edges of shadows. Measured on regular nets: up to 0.0065; nets whose knots are displaced by 6 % of a cell show 0.11 to 0.15.
-const SYSTEMATIC: f64 = 0.01;
+const SYSTEMATIC: f64 = 0.007;
 
 /// What is known of the lattice in the earlier picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
