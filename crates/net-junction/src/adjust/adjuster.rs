@@ -3,12 +3,14 @@ use net_geometry::{Junction, JunctionState};
 use net_image::GrayView;
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::Graph;
+use crate::adjust::connect::Connector;
+use crate::adjust::graph::{Graph, predict};
 use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
 use crate::adjust::presence::{Presence, Twine, TwineState, template_half};
 use crate::adjust::profile::Profiles;
 use crate::adjust::solve::Solver;
+use crate::adjust::warp::{Warp, Warped, radii};
 use crate::error::{Error, Result};
 
 /// No junction is claimed to be known better than this, px.
@@ -28,6 +30,7 @@ pub struct NetAdjuster {
     locator: Locator,
     solver: Solver,
     presence: Presence,
+    connector: Connector,
     heights: Vec<f32>,
     junctions: Vec<Junction>,
     twine_m: f64,
@@ -54,6 +57,7 @@ impl NetAdjuster {
             locator: Locator::default(),
             solver: Solver::default(),
             presence: Presence::default(),
+            connector: Connector::default(),
             heights: Vec::new(),
             junctions: Vec::new(),
             twine_m: f64::NAN,
@@ -77,23 +81,58 @@ impl NetAdjuster {
         self.junctions.clear();
         self.presence.twines.clear();
         let Self { config, graph, profiles, locator, solver, presence, .. } = self;
-        // 1. The predicted nodes in view.
-        graph.build(map, self.width, self.height, config.cell_min_px);
+        let (width, height, least) = (self.width, self.height, config.cell_min_px);
+        profiles.load(image);
+        let mut twine = config.twines_m[config.twines_m.len() / 2];
+        let locate_and_solve = |graph: &mut Graph,
+                                profiles: &mut Profiles,
+                                locator: &mut Locator,
+                                solver: &mut Solver,
+                                twine: f64,
+                                search: f64| {
+            locator.locate(graph, profiles, twine, search, config);
+            solver.solve(graph, &profiles.along, &locator.offsets, &locator.weights, config);
+        };
+        // 1. Outward from the seed: what the prediction misses smoothly.
+        let seed =
+            map.seed().and_then(|(i, j)| Some((map.pixel(f64::from(i), f64::from(j))?, predict(map, (i, j))?.height)));
+        let Some((seed, cell)) = seed else { return Ok(&self.junctions) };
+        let mut warp = Warp::none(seed);
+        let diagonal = (width as f64).hypot(height as f64);
+        for (round, radius) in radii(cell, diagonal).enumerate() {
+            graph.build(&Warped { map, warp: &warp }, width, height, least, radius);
+            if graph.edges.is_empty() {
+                continue;
+            }
+            locate_and_solve(graph, profiles, locator, solver, twine, config.search_cells[0]);
+            warp.fit(graph, solver, map, 1 + round.div_ceil(2));
+        }
+        // 2. Whether that helps, over the whole picture: a correction that leads astray finds less.
+        let mut best = (f32::MIN, Warp::none(seed));
+        for warp in [best.1.clone(), warp] {
+            graph.build(&Warped { map, warp: &warp }, width, height, least, f64::MAX);
+            if graph.edges.is_empty() {
+                continue;
+            }
+            locate_and_solve(graph, profiles, locator, solver, twine, config.search_cells[0]);
+            let found = solver.weight();
+            if found > best.0 {
+                best = (found, warp);
+            }
+        }
+        // 3. All nodes in view and their twines' bows, from wide to narrow search.
+        graph.build(&Warped { map, warp: &best.1 }, width, height, least, f64::MAX);
         if graph.edges.is_empty() {
             return Ok(&self.junctions);
         }
-        // 2. Nodes and bows, from wide to narrow search.
-        profiles.load(image);
-        let mut twine = config.twines_m[config.twines_m.len() / 2];
         for (pass, &search) in config.search_cells.iter().enumerate() {
-            locator.locate(graph, profiles, twine, search, config);
-            solver.solve(graph, &profiles.along, &locator.offsets, &locator.weights, config);
+            locate_and_solve(graph, profiles, locator, solver, twine, search);
             if pass == 0 {
                 twine = locator.fit_twine(graph, profiles, config);
             }
         }
         self.twine_m = twine;
-        // 3. What is really there.
+        // 4. What is really there.
         self.heights.clear();
         self.heights.extend(graph.nodes.iter().map(|n| n.height as f32));
         let height = f64::from(crate::adjust::graph::median(&mut self.heights).unwrap_or(0.0));
@@ -102,6 +141,8 @@ impl NetAdjuster {
         let width = f64::from(crate::adjust::graph::median(&mut self.heights).unwrap_or(0.0));
         let half = template_half(height, width, config.point_spread_px);
         presence.judge(graph, profiles, image, half, config);
+        // 5. As far as names can be trusted.
+        self.connector.walk(&self.graph, &self.presence.twines);
         self.report();
         Ok(&self.junctions)
     }
@@ -123,6 +164,9 @@ impl NetAdjuster {
 
     fn report(&mut self) {
         for (k, node) in self.graph.nodes.iter().enumerate() {
+            if !self.connector.reached(k) {
+                continue;
+            }
             let (i, j) = node.index;
             let before = [(i - 1, j), (i, j - 1)];
             let at = |n: usize, family: usize| {

@@ -93,8 +93,8 @@ impl Graph {
         (edge != NONE).then_some(edge as usize)
     }
 
-    /// Fills in what is in view, growing outward from the map's seed.
-    pub fn build(&mut self, map: &impl LatticeMap, width: usize, height: usize, cell_min_px: f64) {
+    /// Fills in what is in view, growing outward from the map's seed, up to `radius` px from it.
+    pub fn build(&mut self, map: &impl LatticeMap, width: usize, height: usize, cell_min_px: f64, radius: f64) {
         for k in 0..self.nodes.len() {
             if let Some(slot) = self.slot(self.nodes[k].index) {
                 self.grid[slot] = NONE;
@@ -113,6 +113,7 @@ impl Graph {
             }
         }
         let size = Vector2::new((width - 1) as f64, (height - 1) as f64);
+        let Some(middle) = map.pixel(f64::from(seed.0), f64::from(seed.1)) else { return };
         while let Some(index) = self.queue.pop_front() {
             let Some(slot) = self.slot(index) else { continue };
             if self.grid[slot] != NONE {
@@ -120,7 +121,8 @@ impl Graph {
             }
             let Some(node) = predict(map, index) else { continue };
             let p = node.predicted;
-            if !(p.x >= 0.0 && p.y >= 0.0 && p.x <= size.x && p.y <= size.y && node.height >= cell_min_px) {
+            let inside = p.x >= 0.0 && p.y >= 0.0 && p.x <= size.x && p.y <= size.y;
+            if !(inside && node.height >= cell_min_px && (p - middle).norm() <= radius) {
                 continue;
             }
             self.grid[slot] = self.nodes.len() as u32;
@@ -186,7 +188,8 @@ pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-fn predict(map: &impl LatticeMap, index: (i32, i32)) -> Option<Node> {
+/// The node with this index where the map predicts it.
+pub(crate) fn predict(map: &impl LatticeMap, index: (i32, i32)) -> Option<Node> {
     let (i, j) = (f64::from(index.0), f64::from(index.1));
     let predicted = map.pixel(i, j)?;
     let (a, b) = (map.pixel(i + 0.5, j)?, map.pixel(i, j + 0.5)?);
@@ -222,7 +225,7 @@ mod tests {
     fn every_node_in_the_picture_is_there_once() {
         let mut graph = Graph::new(100, 60, 4.5);
         for _ in 0..2 {
-            graph.build(&Flat(10.0), 100, 60, 4.5);
+            graph.build(&Flat(10.0), 100, 60, 4.5, f64::MAX);
             // u from 0 to 90, v from 0 to 50.
             assert_eq!(graph.nodes.len(), 10 * 6);
             assert_eq!(graph.edges.len(), 9 * 6 + 10 * 5);
@@ -230,14 +233,14 @@ mod tests {
             assert!(graph.node_at((9, 0)).is_none());
             assert!(graph.node_at((i32::MAX, i32::MIN)).is_none());
         }
-        graph.build(&Flat(4.0), 100, 60, 4.5);
+        graph.build(&Flat(4.0), 100, 60, 4.5, f64::MAX);
         assert!(graph.nodes.is_empty());
     }
 
     #[test]
     fn the_median_is_over_neighbours_of_the_same_family() {
         let mut graph = Graph::new(100, 60, 4.5);
-        graph.build(&Flat(10.0), 100, 60, 4.5);
+        graph.build(&Flat(10.0), 100, 60, 4.5, f64::MAX);
         let value = |e: &Edge| if e.family == 0 { graph.nodes[e.nodes[0] as usize].index.0 as f32 } else { f32::NAN };
         let values: Vec<_> = graph.edges.iter().map(value).collect();
         let mut out = Vec::new();

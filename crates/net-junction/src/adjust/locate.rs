@@ -66,8 +66,8 @@ impl Locator {
     pub fn fit_twine(&mut self, graph: &Graph, profiles: &mut Profiles, config: &AdjustConfig) -> f64 {
         let half = (0.35 * self.median_height(graph)).clamp(2.0, 9.0) / STEP_PX;
         let half = half.round() as usize;
-        profiles.sample(graph, half, false);
         let stride = (graph.edges.len() / 600).max(1);
+        profiles.sample(graph, half, false, stride);
         let mut best = (f32::MIN, config.twines_m[0]);
         for &twine in &config.twines_m {
             self.kernels.clear();
@@ -109,7 +109,7 @@ impl Locator {
         }));
         let farthest = self.reaches.iter().fold(SEARCH_PX.0, |a, &b| a.max(b));
         let steps = (farthest / STEP_PX).ceil() as usize;
-        profiles.sample(graph, steps + self.widest(), false);
+        profiles.sample(graph, steps + self.widest(), false, 1);
         self.match_all(graph, profiles, steps);
         self.settle_signs(graph, steps);
         self.pick(graph, profiles, steps);

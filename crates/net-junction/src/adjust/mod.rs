@@ -2,6 +2,7 @@
 
 mod adjuster;
 mod config;
+mod connect;
 mod graph;
 mod locate;
 mod map;
@@ -9,6 +10,7 @@ mod presence;
 mod profile;
 mod solve;
 mod template;
+mod warp;
 
 pub use adjuster::NetAdjuster;
 pub use config::AdjustConfig;

@@ -91,7 +91,7 @@ impl Presence {
         half: usize,
         config: &AdjustConfig,
     ) {
-        profiles.sample(graph, half + SHIFT, false);
+        profiles.sample(graph, half + SHIFT, false, 1);
         self.mean_profiles(profiles, half);
         self.learn(graph, half, false);
         let mut twine = std::mem::take(&mut self.twine);
@@ -99,7 +99,7 @@ impl Presence {
         // Once more without what looks absent.
         self.learn(graph, half, true);
         self.reduce(profiles, half, &mut twine);
-        profiles.sample(graph, half + SHIFT, true);
+        profiles.sample(graph, half + SHIFT, true, 1);
         let mut control = std::mem::take(&mut self.control);
         self.reduce(profiles, half, &mut control);
         (self.twine, self.control) = (twine, control);

@@ -77,6 +77,11 @@ impl Solver {
         }
     }
 
+    /// Sum of the bins' weights after the last reweighting: how much twine fits.
+    pub fn weight(&self) -> f32 {
+        self.weights.iter().sum()
+    }
+
     /// Displacement of a twine's ends across it.
     fn ends(&self, graph: &Graph, edge: usize) -> Vector2<f64> {
         let [a, b] = graph.edges[edge].nodes.map(|n| self.step[n as usize]);

@@ -1,0 +1,66 @@
+//! Which nodes belong to the same lattice as the seed: whole cells must not have been lost on the way.
+//!
+//! Where a prediction drifts off by more than half a cell, the neighbouring twine is found, looks as good, and is named wrongly. Between there and
+//! where the prediction is right the displacements change by a whole cell over a few. So names are given as far as one can walk from
+//! the seed over twines whose ends are displaced alike.
+
+use std::collections::VecDeque;
+
+use net_geometry::nalgebra::Vector2;
+
+use crate::adjust::graph::Graph;
+use crate::adjust::presence::{Twine, TwineState};
+
+/// How much the displacements of a twine's ends may differ, cells: on twine that is seen, and across what is not.
+const SEEN_CELLS: f64 = 0.25;
+const UNSEEN_CELLS: f64 = 0.1;
+
+/// Buffers of this stage.
+#[derive(Debug, Default)]
+pub(crate) struct Connector {
+    reached: Vec<bool>,
+    queue: VecDeque<u32>,
+}
+
+impl Connector {
+    /// Whether a node is connected with the seed.
+    pub fn reached(&self, node: usize) -> bool {
+        self.reached[node]
+    }
+
+    /// Walks from the node with a present twine that is nearest to the graph's first node, which is next to the seed.
+    pub fn walk(&mut self, graph: &Graph, twines: &[Twine]) {
+        self.reached.clear();
+        self.reached.resize(graph.nodes.len(), false);
+        self.queue.clear();
+        let Some(seed) = graph.nodes.first().map(|n| n.predicted) else { return };
+        let distance = |n: u32| (graph.nodes[n as usize].predicted - seed).norm_squared();
+        let present = graph.edges.iter().zip(twines).filter(|(_, t)| t.state == TwineState::Present);
+        let nearest = present.map(|(e, _)| e.nodes[0]).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        let Some(start) = nearest else { return };
+        self.reached[start as usize] = true;
+        self.queue.push_back(start);
+        while let Some(node) = self.queue.pop_front() {
+            let (i, j) = graph.nodes[node as usize].index;
+            let around = [((i, j), 0), ((i, j), 1), ((i - 1, j), 0), ((i, j - 1), 1)];
+            for (index, family) in around {
+                let Some(edge) = graph.node_at(index).and_then(|n| graph.edge_from(n, family)) else { continue };
+                let [a, b] = graph.edges[edge].nodes;
+                let other = if a == node { b } else { a };
+                let allowed = if twines[edge].state == TwineState::Present { SEEN_CELLS } else { UNSEEN_CELLS };
+                if !self.reached[other as usize] && apart(graph, a, b) < allowed {
+                    self.reached[other as usize] = true;
+                    self.queue.push_back(other);
+                }
+            }
+        }
+    }
+}
+
+/// Difference of two nodes' displacements, cells: the larger component along the two lattice directions.
+fn apart(graph: &Graph, a: u32, b: u32) -> f64 {
+    let [a, b] = [a, b].map(|n| &graph.nodes[n as usize]);
+    let [s1, s2] = a.half_steps.map(|s| s * 2.0);
+    let (d, cross): (Vector2<f64>, f64) = (b.shift - a.shift, s1.perp(&s2));
+    (d.perp(&s2) / cross).abs().max((s1.perp(&d) / cross).abs())
+}
