@@ -56,6 +56,7 @@ mod snap;
 mod surface;
 mod tracker;
 mod tracks;
+pub mod vote;
 mod zncc;
 
 pub use block_match::{Guess, Match, MatchState, Matcher, match_points};

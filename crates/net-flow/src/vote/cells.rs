@@ -1,0 +1,216 @@
+//! The picture cell by cell, its lattice subtracted.
+
+use nalgebra::Vector2;
+use net_image::{GrayView, Pyramid};
+
+use crate::block_match::SMALLEST_SIDE_PX;
+use crate::error::Result;
+use crate::flatten::Flatten;
+
+/// Samples along a cell's side.
+const SIDE: usize = 12;
+/// Numbers of a cell.
+pub(super) const CELL: usize = SIDE * SIDE;
+/// Cells either way whose mean is the lattice.
+const NEIGHBOURS: usize = 3;
+/// A cell takes part when it shows the lattice this strongly, relative to its neighbours: outside are fish and haze.
+const AMPLITUDE: std::ops::Range<f32> = 0.4..2.5;
+/// Fewest cells that make a frame.
+pub(super) const MIN_CELLS: usize = 12;
+/// Radius over which the light's slow changes are taken away, px.
+const FLATTEN_PX: usize = 25;
+
+/// What does not repeat, cell by cell.
+#[derive(Debug, Clone)]
+pub(super) struct Cells {
+    pub columns: usize,
+    pub rows: usize,
+    /// Lattice coordinates of the first cell.
+    pub corner: (i32, i32),
+    /// Per cell `CELL` numbers of unit length in all.
+    pub patches: Vec<[f32; CELL]>,
+    /// Per cell the brightness of its knot against its neighbours', in deviations.
+    pub knots: Vec<f32>,
+    /// Which cells take part.
+    pub valid: Vec<bool>,
+}
+
+impl Cells {
+    pub(super) fn new(columns: usize, rows: usize) -> Self {
+        let n = columns * rows;
+        Self {
+            columns,
+            rows,
+            corner: (0, 0),
+            patches: vec![[0.0; CELL]; n],
+            knots: vec![0.0; n],
+            valid: vec![false; n],
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        !self.valid.contains(&true)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.valid.fill(false);
+    }
+
+    /// Moves all cells' numbers.
+    pub(super) fn renumber(&mut self, by: (i32, i32)) {
+        self.corner = (self.corner.0.saturating_add(by.0), self.corner.1.saturating_add(by.1));
+    }
+}
+
+/// Lays pictures out. Owns its buffers.
+#[derive(Debug)]
+pub(super) struct Layout {
+    flatten: Flatten,
+    pyramid: Pyramid,
+    columns: usize,
+    rows: usize,
+    /// Sums over rows of neighbours, then over squares.
+    across: Vec<[f32; CELL]>,
+    /// How many cells are in each sum.
+    counts: Vec<f32>,
+    /// The cells as sampled, less their means.
+    raw: Vec<[f32; CELL]>,
+    deviations: Vec<f32>,
+    sorted: Vec<f32>,
+}
+
+impl Layout {
+    pub(super) fn new(columns: usize, rows: usize) -> Result<Self> {
+        let n = columns * rows;
+        Ok(Self {
+            flatten: Flatten::new(FLATTEN_PX)?,
+            pyramid: Pyramid::new(4),
+            columns,
+            rows,
+            across: vec![[0.0; CELL]; n],
+            counts: vec![0.0; n],
+            raw: vec![[0.0; CELL]; n],
+            deviations: vec![0.0; n],
+            sorted: Vec::with_capacity(n),
+        })
+    }
+
+    /// Fills `cells` from a picture; false when too few cells show a lattice.
+    pub(super) fn fill(
+        &mut self,
+        view: GrayView<'_>,
+        corner: (i32, i32),
+        pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+        cells: &mut Cells,
+    ) -> bool {
+        cells.corner = corner;
+        cells.clear();
+        self.pyramid.build(self.flatten.apply(view), SMALLEST_SIDE_PX);
+        let at = |i: f64, j: f64| {
+            let p = pixel_from_lattice(Vector2::new(f64::from(corner.0) + i, f64::from(corner.1) + j))?;
+            (p.x.is_finite() && p.y.is_finite()).then_some(p)
+        };
+        // The level at which a sample of the middle cell is about a pixel.
+        let (i, j) = (self.columns as f64 / 2.0, self.rows as f64 / 2.0);
+        let (Some(o), Some(a), Some(b)) = (at(i, j), at(i + 1.0, j), at(i, j + 1.0)) else { return false };
+        let cell_px = (a - o).norm().min((b - o).norm());
+        let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, self.pyramid.len() as f64 - 1.0) as usize;
+        let Some(view) = self.pyramid.level(level) else { return false };
+        let scale = f64::from(1u32 << level);
+        for (k, (raw, valid)) in self.raw.iter_mut().zip(&mut cells.valid).enumerate() {
+            let (i, j) = ((k % self.columns) as f64, (k / self.columns) as f64);
+            *valid = true;
+            for (s, value) in raw.iter_mut().enumerate() {
+                // A cell is half a mesh either way round its knot.
+                let place = |x: usize| (x as f64 + 0.5) / SIDE as f64 - 0.5;
+                let sample = at(i + place(s % SIDE), j + place(s / SIDE))
+                    .and_then(|p| net_image::bilinear(view, p.x / scale, p.y / scale));
+                *valid &= sample.is_some();
+                *value = sample.unwrap_or(0.0);
+            }
+            let mean = raw.iter().sum::<f32>() / CELL as f32;
+            raw.iter_mut().for_each(|x| *x = if *valid { *x - mean } else { 0.0 });
+        }
+        self.neighbours(&cells.valid);
+        self.subtract_lattice(cells);
+        cells.valid.iter().filter(|&&v| v).count() >= MIN_CELLS
+    }
+
+    /// The mean cell of the neighbourhood of each, into `across`.
+    fn neighbours(&mut self, valid: &[bool]) {
+        let (columns, rows) = (self.columns, self.rows);
+        // Sums along rows into `across`, counts beside.
+        for k in 0..columns * rows {
+            let (i, j) = (k % columns, k / columns);
+            let mut sum = [0.0f32; CELL];
+            let mut count = 0.0;
+            for i in i.saturating_sub(NEIGHBOURS)..=(i + NEIGHBOURS).min(columns - 1) {
+                if valid[j * columns + i] {
+                    count += 1.0;
+                    sum.iter_mut().zip(&self.raw[j * columns + i]).for_each(|(s, x)| *s += x);
+                }
+            }
+            (self.across[k], self.counts[k]) = (sum, count);
+        }
+    }
+
+    /// Subtracts each cell's share of its neighbourhood's mean cell; normalises what is left.
+    fn subtract_lattice(&mut self, cells: &mut Cells) {
+        let (columns, rows) = (self.columns, self.rows);
+        for k in 0..columns * rows {
+            if !cells.valid[k] {
+                continue;
+            }
+            let (i, j) = (k % columns, k / columns);
+            let mut mean = [0.0f32; CELL];
+            let mut count = 0.0;
+            for j in j.saturating_sub(NEIGHBOURS)..=(j + NEIGHBOURS).min(rows - 1) {
+                count += self.counts[j * columns + i];
+                mean.iter_mut().zip(&self.across[j * columns + i]).for_each(|(s, x)| *s += x);
+            }
+            mean.iter_mut().for_each(|x| *x /= f32::max(count, 1.0));
+            let amplitude = dot(&self.raw[k], &mean) / (dot(&mean, &mean) + 1e-9);
+            let patch = &mut cells.patches[k];
+            let share = amplitude.clamp(0.0, 3.0);
+            patch.iter_mut().zip(self.raw[k].iter().zip(&mean)).for_each(|(p, (x, m))| *p = x - share * m);
+            let own = patch.iter().sum::<f32>() / CELL as f32;
+            patch.iter_mut().for_each(|x| *x -= own);
+            self.deviations[k] = (dot(patch, patch) / CELL as f32).sqrt();
+            cells.knots[k] = knot(&self.raw[k]) - knot(&mean);
+            cells.valid[k] = AMPLITUDE.contains(&amplitude);
+        }
+        let of = |values: &[f32], sorted: &mut Vec<f32>| {
+            sorted.clear();
+            sorted.extend(values.iter().zip(&cells.valid).filter(|(_, v)| **v).map(|(x, _)| x.abs()));
+            let middle = sorted.len() / 2;
+            if sorted.is_empty() { 1.0 } else { sorted.select_nth_unstable_by(middle, f32::total_cmp).1.max(1e-6) }
+        };
+        let typical = of(&self.deviations, &mut self.sorted);
+        let spread = 1.4826 * of(&cells.knots, &mut self.sorted);
+        for k in (0..columns * rows).filter(|&k| cells.valid[k]) {
+            cells.knots[k] = (cells.knots[k] / spread).clamp(-4.0, 4.0);
+            let patch = &mut cells.patches[k];
+            // Outliers are cut, and then every cell has one voice.
+            patch.iter_mut().for_each(|x| *x = (*x / typical).clamp(-3.0, 3.0));
+            let norm = dot(patch, patch).sqrt().max(1e-6);
+            patch.iter_mut().for_each(|x| *x /= norm);
+        }
+    }
+}
+
+/// Mean of the middle of a cell.
+fn knot(cell: &[f32; CELL]) -> f32 {
+    const MIDDLE: std::ops::Range<usize> = SIDE / 2 - 2..SIDE / 2 + 2;
+    MIDDLE.flat_map(|v| MIDDLE.map(move |u| cell[v * SIDE + u])).sum::<f32>() / (MIDDLE.len() * MIDDLE.len()) as f32
+}
+
+/// Sum of products in eight lanes.
+pub(super) fn dot(a: &[f32; CELL], b: &[f32; CELL]) -> f32 {
+    let mut lanes = [0.0f32; 8];
+    for (a, b) in a.as_chunks::<8>().0.iter().zip(b.as_chunks::<8>().0) {
+        for k in 0..8 {
+            lanes[k] += a[k] * b[k];
+        }
+    }
+    lanes.iter().sum()
+}

@@ -1,0 +1,67 @@
+//! Evidence added up until it suffices.
+
+use super::{LISTED, ShiftScore, Verdict, VoteConfig, VoteResult};
+
+/// What a frame says of a shift for which it had too few common cells, deviations: against it.
+const UNSEEN: f64 = -3.0;
+
+/// Sums over undecided frames. Owns its buffers.
+#[derive(Debug)]
+pub(super) struct Evidence {
+    reach: i32,
+    min_z: f64,
+    min_ratio: f64,
+    memory: usize,
+    /// Deviations of the undecided frames, oldest first, `shifts` numbers each.
+    frames: Vec<f64>,
+    shifts: usize,
+}
+
+impl Evidence {
+    pub(super) fn new(config: &VoteConfig) -> Self {
+        let shifts = (2 * config.reach_cells + 1).pow(2);
+        Self {
+            reach: config.reach_cells as i32,
+            min_z: config.min_z,
+            min_ratio: config.min_ratio,
+            memory: config.memory_frames,
+            frames: Vec::with_capacity(shifts * (config.memory_frames + 1)),
+            shifts,
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.frames.clear();
+    }
+
+    /// Adds a frame's deviations and judges all that are undecided.
+    pub(super) fn add(&mut self, z: &[Option<f64>], compared: usize) -> VoteResult {
+        if self.frames.len() == self.memory * self.shifts {
+            // The oldest stays undecided for good.
+            self.frames.drain(..self.shifts);
+        }
+        self.frames.extend(z.iter().map(|z| z.unwrap_or(UNSEEN)));
+        let count = self.frames.len() / self.shifts;
+        let mut best = [ShiftScore { cells: (0, 0), z: f64::NEG_INFINITY }; LISTED];
+        let side = 2 * self.reach + 1;
+        for k in 0..self.shifts {
+            let sum: f64 = self.frames.iter().skip(k).step_by(self.shifts).sum();
+            let cells = (k as i32 % side - self.reach, k as i32 / side - self.reach);
+            let score = ShiftScore { cells, z: sum / (count as f64).sqrt() };
+            let place = best.partition_point(|b| b.z >= score.z);
+            if place < LISTED {
+                best[place..].rotate_right(1);
+                best[place] = score;
+            }
+        }
+        let (first, second) = (best[0].z, best[1].z);
+        let decided = first > self.min_z && first > self.min_ratio * second;
+        VoteResult {
+            verdict: if decided { Verdict::Decided } else { Verdict::Ambiguous },
+            frames: count as u32,
+            shifts: best,
+            log_odds: (first.max(0.0).powi(2) - second.max(0.0).powi(2)) / 2.0,
+            compared,
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! The vote: by how many whole cells has the net moved, judged by what does *not* repeat.
+//!
+//! The picture is laid out cell by cell in lattice coordinates, the lattice itself is subtracted, and what is left (bow and jitter of the twine, growth,
+//! broken meshes) is compared with the frame before, moved by every whole shift in reach. The right shift stands out from the others by many of their deviations.
+//! Where it does not, evidence is added up over frames, since a velocity that is wrong by a cell a frame is wrong by the same cell every time; until it
+//! suffices the answer is *ambiguous*, with the rivals.
+
+mod cells;
+mod evidence;
+mod score;
+
+use nalgebra::Vector2;
+use net_image::GrayView;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Result, in_range};
+use cells::{Cells, Layout};
+use evidence::Evidence;
+use score::Scores;
+
+/// Parameters of the vote.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VoteConfig {
+    /// Cells compared on either side of the middle along the first lattice direction, 3 to 32. Default 9.
+    pub half_columns: usize,
+    /// The same along the second, 3 to 32. Default 6.
+    pub half_rows: usize,
+    /// Largest shift tried, cells either way, 1 to 8. Default 4.
+    pub reach_cells: usize,
+    /// Combined deviations by which the best shift must stand out, 3 to 100. Default 5.
+    pub min_z: f64,
+    /// And so many times as far as the second, 1 to 10. Default 1.5.
+    pub min_ratio: f64,
+    /// Undecided frames whose evidence is added up, 1 to 32. Default 8.
+    pub memory_frames: usize,
+}
+
+impl Default for VoteConfig {
+    fn default() -> Self {
+        Self { half_columns: 9, half_rows: 6, reach_cells: 4, min_z: 5.0, min_ratio: 1.5, memory_frames: 8 }
+    }
+}
+
+impl VoteConfig {
+    /// Refuses values out of range.
+    ///
+    /// # Errors
+    /// [`crate::Error::Value`] names the field and the value.
+    pub fn validate(&self) -> Result<()> {
+        in_range("half_columns", self.half_columns as f64, 3.0, 32.0, "3 to 32 cells")?;
+        in_range("half_rows", self.half_rows as f64, 3.0, 32.0, "3 to 32 cells")?;
+        in_range("reach_cells", self.reach_cells as f64, 1.0, 8.0, "1 to 8 cells")?;
+        in_range("min_z", self.min_z, 3.0, 100.0, "3 to 100")?;
+        in_range("min_ratio", self.min_ratio, 1.0, 10.0, "1 to 10")?;
+        in_range("memory_frames", self.memory_frames as f64, 1.0, 32.0, "1 to 32")
+    }
+}
+
+/// What the vote says of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The first frame: nothing to compare with.
+    Started,
+    /// The shift is certain.
+    Decided,
+    /// It is not: keep the prediction, and say so.
+    Ambiguous,
+    /// Too few cells in common, or no lattice to see.
+    Blind,
+}
+
+/// One shift and how far it stands out.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ShiftScore {
+    /// Cells to add to this frame's lattice coordinates to agree with the frame before.
+    pub cells: (i32, i32),
+    /// Deviations above the median shift, evidence of undecided frames added up.
+    pub z: f64,
+}
+
+/// Number of shifts that a result lists.
+pub const LISTED: usize = 4;
+
+/// What the vote says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VoteResult {
+    /// How certain it is.
+    pub verdict: Verdict,
+    /// Frames in a row whose evidence is in this verdict, this one included. When decided for a shift k with m frames: each of them was off by k more than the
+    /// one before, so this one's coordinates are to be moved by m k, the one before's by (m - 1) k, and so on.
+    pub frames: u32,
+    /// The likeliest shifts *per frame*, best first.
+    pub shifts: [ShiftScore; LISTED],
+    /// Natural logarithm of the odds of the best shift to the second.
+    pub log_odds: f64,
+    /// Cells that were compared at no shift.
+    pub compared: usize,
+}
+
+impl VoteResult {
+    fn without_scores(verdict: Verdict) -> Self {
+        Self { verdict, frames: 0, shifts: [ShiftScore::default(); LISTED], log_odds: 0.0, compared: 0 }
+    }
+
+    /// Cells by which this frame's coordinates are to be moved; `None` while undecided.
+    pub fn correction(&self) -> Option<(i32, i32)> {
+        let m = i32::try_from(self.frames).unwrap_or(i32::MAX);
+        let (i, j) = self.shifts[0].cells;
+        (self.verdict == Verdict::Decided).then(|| (i.saturating_mul(m), j.saturating_mul(m)))
+    }
+}
+
+/// Compares each frame with the one before. Owns its buffers.
+#[derive(Debug)]
+pub struct CellVote {
+    config: VoteConfig,
+    layout: Layout,
+    here: Cells,
+    before: Cells,
+    scores: Scores,
+    evidence: Evidence,
+}
+
+impl CellVote {
+    /// A vote without a frame yet.
+    ///
+    /// # Errors
+    /// [`crate::Error::Value`] for a parameter out of range.
+    pub fn new(config: &VoteConfig) -> Result<Self> {
+        config.validate()?;
+        let (columns, rows) = (2 * config.half_columns, 2 * config.half_rows);
+        Ok(Self {
+            config: config.clone(),
+            layout: Layout::new(columns, rows)?,
+            here: Cells::new(columns, rows),
+            before: Cells::new(columns, rows),
+            scores: Scores::new(config.reach_cells),
+            evidence: Evidence::new(config),
+        })
+    }
+
+    /// Forgets the frames so far.
+    pub fn reset(&mut self) {
+        self.before.clear();
+        self.evidence.clear();
+    }
+
+    /// The next frame. `middle` is the cell to lay out round (the one at the optical axis), `pixel_from_lattice` tells where a lattice coordinate (cycles along
+    /// the two directions, knots at whole numbers) lies in this picture, `None` where it does not. Numbers continue those of the frame before, corrected as
+    /// its result said.
+    pub fn update(
+        &mut self,
+        view: GrayView<'_>,
+        middle: (i32, i32),
+        pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> VoteResult {
+        std::mem::swap(&mut self.here, &mut self.before);
+        let corner = (
+            middle.0.saturating_sub(self.config.half_columns as i32),
+            middle.1.saturating_sub(self.config.half_rows as i32),
+        );
+        let seen = self.layout.fill(view, corner, pixel_from_lattice, &mut self.here);
+        if !seen {
+            self.here.clear();
+        }
+        if self.before.is_empty() {
+            self.evidence.clear();
+            return VoteResult::without_scores(if seen { Verdict::Started } else { Verdict::Blind });
+        }
+        let compared = if seen { self.scores.compare(&self.before, &self.here) } else { 0 };
+        if compared == 0 {
+            // This frame says nothing: the next cannot be compared with it, and the chain of evidence ends here.
+            self.evidence.clear();
+            return VoteResult::without_scores(Verdict::Blind);
+        }
+        let result = self.evidence.add(self.scores.z(), compared);
+        if let Some(correction) = result.correction() {
+            self.here.renumber(correction);
+            self.evidence.clear();
+        }
+        result
+    }
+}
