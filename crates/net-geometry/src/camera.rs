@@ -156,14 +156,15 @@ impl Camera {
         let distorted = self.plane_from_pixel(pixel);
         match self.lens {
             Lens::None => Some(distorted.push(1.0)),
-            lens => lens.undistort(distorted, self.valid_radius).map(|(point, _)| point.push(1.0)),
+            lens => lens.undistort(distorted, self.valid_radius).map(|point| point.push(1.0)),
         }
     }
 
     /// As [`Camera::ray_from_pixel`], with the Jacobian `d(x, y) / d(u, v)`.
     #[inline]
     pub fn ray_from_pixel_with_jacobian(&self, pixel: Vector2<f64>) -> Option<(Vector3<f64>, Matrix2<f64>)> {
-        let (point, distortion) = self.lens.undistort(self.plane_from_pixel(pixel), self.valid_radius)?;
+        let point = self.lens.undistort(self.plane_from_pixel(pixel), self.valid_radius)?;
+        let (_, distortion) = self.lens.distort(point);
         let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / self.fx, 1.0 / self.fy));
         Some((point.push(1.0), distortion.try_inverse()? * scale))
     }

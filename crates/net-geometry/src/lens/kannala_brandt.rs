@@ -36,17 +36,12 @@ pub(super) fn distort(k: &[f64; 4], point: Vector2<f64>) -> (Vector2<f64>, Matri
     (point * across, (Matrix2::identity() - outer) * across + outer * along)
 }
 
-/// The point that goes to `distorted`, and the Jacobian there.
-pub(super) fn undistort(
-    k: &[f64; 4],
-    distorted: Vector2<f64>,
-    valid_radius: f64,
-) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+/// The point that goes to `distorted`.
+pub(super) fn undistort(k: &[f64; 4], distorted: Vector2<f64>, valid_radius: f64) -> Option<Vector2<f64>> {
     let length = distorted.norm();
     if length < CENTRE {
-        return Some((distorted, Matrix2::identity()));
+        return Some(distorted);
     }
     let angle = solve_increasing(length, valid_radius.atan(), |angle| radial(k, angle))?;
-    let point = distorted * (angle.tan() / length);
-    Some((point, distort(k, point).1))
+    Some(distorted * (angle.tan() / length))
 }

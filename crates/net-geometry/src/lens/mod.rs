@@ -31,8 +31,11 @@ const MAX_RADIUS: f64 = 572.957;
 /// Where a lens squeezes lengths to less than this, it is taken to turn back.
 const MIN_STRETCH: f64 = 1e-3;
 
-/// Newton steps before a point counts as having no inverse. Six or fewer are enough for real lenses.
+/// Newton steps before a point counts as having no inverse.
 const MAX_STEPS: usize = 30;
+
+/// Newton steps from a guess before a better start is looked for. Real lenses take three to five.
+const QUICK_STEPS: usize = 8;
 
 /// Distance, on the plane `z = 1`, at which Newton's method has arrived: a millionth of a millionth of a focal length.
 const ARRIVED: f64 = 1e-12;
@@ -112,11 +115,11 @@ impl Lens {
         }
     }
 
-    /// The point within `valid_radius` that [`Lens::distort`] takes to `distorted`, and the Jacobian of `distort` there.
+    /// The point within `valid_radius` that [`Lens::distort`] takes to `distorted`.
     #[inline]
-    pub(crate) fn undistort(&self, distorted: Vector2<f64>, valid_radius: f64) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    pub(crate) fn undistort(&self, distorted: Vector2<f64>, valid_radius: f64) -> Option<Vector2<f64>> {
         match self {
-            Self::None => Some((distorted, Matrix2::identity())),
+            Self::None => Some(distorted),
             Self::PlumbBob(k) => rational::undistort(&plumb_bob::as_rational(k), distorted, valid_radius),
             Self::Rational(k) => rational::undistort(k, distorted, valid_radius),
             Self::KannalaBrandt(k) => kannala_brandt::undistort(k, distorted, valid_radius),

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{ARRIVED, MAX_STEPS, solve_increasing};
+use super::{ARRIVED, MAX_STEPS, QUICK_STEPS, solve_increasing};
 
 /// `g` and `dg / d(r²)`.
 #[inline]
@@ -46,28 +46,41 @@ pub(super) fn distort(k: &[f64; 8], point: Vector2<f64>) -> (Vector2<f64>, Matri
     (distorted, Matrix2::identity() * diagonal + outer + point * p.transpose() + p * point.transpose())
 }
 
-/// The point that goes to `distorted`, and the Jacobian there.
-pub(super) fn undistort(
-    k: &[f64; 8],
-    distorted: Vector2<f64>,
-    valid_radius: f64,
-) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+/// The point that goes to `distorted`.
+pub(super) fn undistort(k: &[f64; 8], distorted: Vector2<f64>, valid_radius: f64) -> Option<Vector2<f64>> {
+    // Lenses are nearly the identity, so Newton's method mostly arrives from there.
+    let (g, _) = radial(k, distorted.norm_squared());
+    if let Some(point) = newton(k, distorted, distorted / g.max(0.5), valid_radius, QUICK_STEPS) {
+        return Some(point);
+    }
+    // If not, without the tangential part, which is small, it is a matter of the radius alone, and safely solved.
     let length = distorted.norm();
     let radius = |r: f64| {
         let (g, slope) = radial(k, r * r);
         (r * g, g + 2.0 * r * r * slope)
     };
-    // Without the tangential part, which is small, it is a matter of the radius alone.
     let start = solve_increasing(length.min(radius(valid_radius).0), valid_radius, radius)?;
-    let mut point = if length > 0.0 { distorted * (start / length) } else { distorted };
-    for _ in 0..MAX_STEPS {
+    newton(k, distorted, distorted * (start / length), valid_radius, MAX_STEPS)
+}
+
+/// Newton's method from `point`. Where it arrives within the valid radius is the one point that goes to `distorted`, wherever it started.
+#[inline]
+fn newton(
+    k: &[f64; 8],
+    distorted: Vector2<f64>,
+    mut point: Vector2<f64>,
+    valid_radius: f64,
+    max_steps: usize,
+) -> Option<Vector2<f64>> {
+    for _ in 0..max_steps {
         let (image, jacobian) = distort(k, point);
-        let step = jacobian.try_inverse()? * (distorted - image);
+        let error = distorted - image;
+        let (a, b, d) = (jacobian[(0, 0)], jacobian[(0, 1)], jacobian[(1, 1)]);
+        let step = Vector2::new(d * error.x - b * error.y, a * error.y - b * error.x) / (a * d - b * b);
         point += step;
-        if step.norm() <= ARRIVED * (1.0 + point.norm()) {
-            let (image, jacobian) = distort(k, point);
-            let inside = point.norm() <= valid_radius && (image - distorted).norm() <= 10.0 * ARRIVED * (1.0 + length);
-            return inside.then_some((point, jacobian));
+        // NaN never arrives.
+        if step.norm_squared() <= ARRIVED * ARRIVED * (1.0 + point.norm_squared()) {
+            return (point.norm_squared() <= valid_radius * valid_radius).then_some(point);
         }
     }
     None
