@@ -2,7 +2,7 @@
 
 use net_image::convert::grey_from_colour;
 use net_image::{ColourLayout, GrayView, Image};
-use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -66,4 +66,14 @@ impl<'py> FromPyObject<'_, 'py> for GrayArgument<'py> {
         };
         Err(PyTypeError::new_err(format!("expected a numpy array, uint8 of shape (H, W) or (H, W, 3) RGB, got {got}")))
     }
+}
+
+/// `rows * columns` values as an array of that shape.
+pub fn array2<'py, T: numpy::Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    rows: usize,
+    columns: usize,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    values.into_pyarray(py).reshape([rows, columns])
 }

@@ -3,6 +3,8 @@
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
+use crate::arrays::array2;
+
 /// What one frame says.
 #[pyclass(frozen, module = "netpose_rs")]
 pub struct Estimate {
@@ -55,15 +57,7 @@ impl Estimate {
     }
     #[getter]
     fn lattice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let unnamed = (i32::MIN, i32::MIN);
-        let rows: Vec<i64> = self
-            .junctions
-            .iter()
-            .flat_map(|j| {
-                let (i, j) = j.index.unwrap_or(unnamed);
-                [i64::from(i), i64::from(j)]
-            })
-            .collect();
+        let rows: Vec<i64> = self.junctions.iter().flat_map(index_or_unnamed).collect();
         array2(py, rows, self.junctions.len(), 2)
     }
     fn __repr__(&self) -> String {
@@ -79,18 +73,14 @@ impl Estimate {
     }
 }
 
-/// `rows * columns` values as an array of that shape.
-pub fn array2<'py, T: numpy::Element>(
-    py: Python<'py>,
-    values: Vec<T>,
-    rows: usize,
-    columns: usize,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    use numpy::{IntoPyArray, PyArrayMethods};
-    values.into_pyarray(py).reshape([rows, columns])
+/// Lattice indices; the lowest 32-bit number where a junction has no name.
+pub fn index_or_unnamed(junction: &netpose::Junction) -> [i64; 2] {
+    let (i, j) = junction.index.unwrap_or((i32::MIN, i32::MIN));
+    [i64::from(i), i64::from(j)]
 }
 
-fn matrix<'py>(py: Python<'py>, n: usize, at: impl Fn(usize, usize) -> f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
+/// `n * n` values as a matrix.
+pub fn matrix<'py>(py: Python<'py>, n: usize, at: impl Fn(usize, usize) -> f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let values = (0..n * n).map(|k| at(k / n, k % n)).collect();
     array2(py, values, n, n)
 }

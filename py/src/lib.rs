@@ -3,6 +3,7 @@
 mod arrays;
 mod camera;
 mod estimate;
+mod stages;
 mod tracker;
 
 /// The private extension module.
@@ -12,6 +13,14 @@ mod _core {
     use crate::camera::{Camera, Mesh};
     #[pymodule_export]
     use crate::estimate::Estimate;
+    #[pymodule_export]
+    use crate::stages::fft::{lattice_vectors, peaks, scores, spectrum};
+    #[pymodule_export]
+    use crate::stages::flow::{FlowResult, FlowTracker, Matches, match_points};
+    #[pymodule_export]
+    use crate::stages::junction::{Junctions, detect};
+    #[pymodule_export]
+    use crate::stages::sim::{SimFrame, render, scenarios};
     #[pymodule_export]
     use crate::tracker::{Tracker, estimate};
 }

@@ -4,6 +4,7 @@ Camera frame: x right, y down, z forward. Pixels (u, v): the centre of the top-l
 The net is the plane Z = 0 of its frame, X along the first mesh direction, Z away from the camera; poses are net to camera.
 """
 
+from netpose_rs import fft, flow, junction, sim
 from netpose_rs._core import Camera, Estimate, Mesh, Tracker, estimate
 
-__all__ = ["Camera", "Estimate", "Mesh", "Tracker", "estimate"]
+__all__ = ["Camera", "Estimate", "Mesh", "Tracker", "estimate", "fft", "flow", "junction", "sim"]

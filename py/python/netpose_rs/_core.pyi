@@ -1,0 +1,217 @@
+from os import PathLike
+from typing import Any, Literal, final
+
+import numpy as np
+import numpy.typing as npt
+
+#: uint8, (H, W) grey or (H, W, 3) RGB. Grey with contiguous rows is read in place, anything else is converted once.
+Image = npt.NDArray[np.uint8]
+Method = Literal["lattice"]
+
+@final
+class Camera:
+    """A calibrated camera.
+
+    fx, fy, cx, cy: pixels. width, height: pixels. distortion: OpenCV's order; 4 or 5 values are ``plumb_bob``, 8 are
+    ``rational_polynomial``; 4 with ``model="equidistant"`` are a fisheye (Kannala-Brandt).
+    Raises ValueError that names the value which is not finite or out of range.
+    """
+
+    def __new__(
+        cls,
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        width: int,
+        height: int,
+        distortion: list[float] | npt.NDArray[np.float64] | None = None,
+        model: Literal["plumb_bob", "rational_polynomial", "equidistant"] | None = None,
+    ) -> Camera: ...
+    @staticmethod
+    def from_yaml(path: str | PathLike[str]) -> Camera:
+        """ROS ``camera_info`` YAML or Kalibr camchain YAML. Raises ValueError that names file, field and value."""
+    @property
+    def fx(self) -> float: ...
+    @property
+    def fy(self) -> float: ...
+    @property
+    def cx(self) -> float: ...
+    @property
+    def cy(self) -> float: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+
+@final
+class Mesh:
+    """Two lattice vectors in the net plane. A side is knot to knot, metres; not the stretched mesh."""
+
+    @staticmethod
+    def square(cell: float) -> Mesh: ...
+    @staticmethod
+    def rectangular(a: float, b: float) -> Mesh: ...
+    @staticmethod
+    def oblique(a: float, b: float, angle: float) -> Mesh:
+        """angle: radians between the sides, in (0, pi)."""
+    @staticmethod
+    def parse(text: str) -> Mesh:
+        """``50mm``, ``5cm``, ``0.05m``, ``0.05`` (metres), ``50x40mm``, ``50x50mm@60deg``."""
+    @property
+    def sides(self) -> tuple[float, float]: ...
+    @property
+    def angle(self) -> float: ...
+
+@final
+class Estimate:
+    """What one frame says. Pose and what follows from it are None unless ``status`` is ``"ok"``."""
+
+    @property
+    def status(self) -> Literal["ok", "no_net"]: ...
+    @property
+    def probability(self) -> float:
+        """In [0, 1]: that this frame shows a net and that the pose is right."""
+    @property
+    def range_m(self) -> float | None:
+        """From the camera centre to the net along the optical axis, m."""
+    @property
+    def distance_m(self) -> float | None:
+        """Perpendicular distance, m."""
+    @property
+    def normal(self) -> npt.NDArray[np.float64] | None:
+        """(3,) unit normal of the net in the camera frame, positive z."""
+    @property
+    def pose(self) -> npt.NDArray[np.float64] | None:
+        """(4, 4) net to camera."""
+    @property
+    def covariance(self) -> npt.NDArray[np.float64] | None:
+        """(6, 6), rotation (rad) then translation (m), perturbation in the camera frame."""
+    @property
+    def junctions(self) -> npt.NDArray[np.float64]:
+        """(N, 2) pixels (u, v), lens distortion included."""
+    @property
+    def lattice(self) -> npt.NDArray[np.int64]:
+        """(N, 2) lattice indices (i, j) of ``junctions``; the lowest int32 where a junction has no name."""
+
+@final
+class Tracker:
+    """Follows one net through the frames of one camera."""
+
+    def __new__(cls, camera: Camera, mesh: Mesh, *, method: Method | None = None) -> Tracker: ...
+    def update(self, image: Image, timestamp_ns: int) -> Estimate:
+        """The next frame. Raises ValueError for an image of another size than the camera's, or a time that does not come
+        after the frame before; TypeError for another dtype or shape."""
+
+def estimate(image: Image, camera: Camera, mesh: Mesh, *, method: Method | None = None) -> Estimate:
+    """One image, no state."""
+
+# Stages: documented in the modules fft, junction, flow and sim.
+
+def spectrum(image: Image, *, window: bool = True, logarithm: bool = True, blur: bool = True) -> npt.NDArray[np.uint8]: ...
+def peaks(
+    spectrum: Image, *, neighbourhood: int = 16, threshold: int = 20, cluster: float = 10.0
+) -> npt.NDArray[np.float64]: ...
+def scores(
+    spectrum: Image,
+    *,
+    ellipse: float = 0.25,
+    constant_radius: float = 4.0,
+    neighbourhood: int = 16,
+    threshold: int = 20,
+    cluster: float = 10.0,
+) -> npt.NDArray[np.float64]: ...
+def lattice_vectors(k1: tuple[float, float], k2: tuple[float, float]) -> npt.NDArray[np.float64]: ...
+@final
+class Junctions:
+    """Junctions of one picture by the contours of its meshes."""
+
+    @property
+    def pixels(self) -> npt.NDArray[np.float64]:
+        """(N, 2) pixels (u, v)."""
+    @property
+    def lattice(self) -> npt.NDArray[np.int64]:
+        """(N, 2) lattice indices (i, j); the lowest int32 where a junction has no name."""
+    @property
+    def sigma_px(self) -> npt.NDArray[np.float64]:
+        """(N,) one standard deviation of the pixel, each axis."""
+    @property
+    def boxes(self) -> npt.NDArray[np.float64]:
+        """(M, 4, 2) corners, px, of the meshes they were found from."""
+
+def detect(
+    image: Image, camera: Camera | None = None, mesh: Mesh | None = None, pose: npt.NDArray[np.float64] | None = None
+) -> Junctions: ...
+@final
+class Matches:
+    """Where points of one picture are in the next."""
+
+    @property
+    def pixels(self) -> npt.NDArray[np.float64]:
+        """(N, 2) pixels in the next picture."""
+    @property
+    def scores(self) -> npt.NDArray[np.float32]:
+        """(N,) normalised correlation, -1 to 1."""
+    @property
+    def found(self) -> npt.NDArray[np.bool_]:
+        """(N,) whether the match was found and found its way back."""
+
+def match_points(previous: Image, next: Image, points: npt.NDArray[np.float64]) -> Matches: ...
+@final
+class FlowResult:
+    """What an update of the tracker tells."""
+
+    @property
+    def status(self) -> Literal["started", "tracked", "ambiguous", "lost"]: ...
+    @property
+    def agreed(self) -> int:
+        """Points that agree with the motion."""
+    @property
+    def spread_px(self) -> float:
+        """Robust standard deviation of their residuals per axis, px."""
+    @property
+    def step(self) -> npt.NDArray[np.float64] | None:
+        """(3, 3) homography from the frame before, pixels to pixels."""
+    @property
+    def from_key(self) -> npt.NDArray[np.float64] | None:
+        """(3, 3) homography from the key frame, pixels to pixels."""
+
+@final
+class FlowTracker:
+    """Follows points through frames of one size by pyramidal block matching."""
+
+    def __new__(cls, width: int, height: int) -> FlowTracker: ...
+    def update(self, image: Image) -> FlowResult: ...
+
+@final
+class SimFrame:
+    """A simulated frame with its truth: that of the nearest net, None or empty where there is none."""
+
+    @property
+    def image(self) -> npt.NDArray[np.uint8]:
+        """(H, W)."""
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def timestamp_ns(self) -> int: ...
+    @property
+    def range_m(self) -> float | None: ...
+    @property
+    def normal(self) -> npt.NDArray[np.float64] | None: ...
+    @property
+    def pose(self) -> npt.NDArray[np.float64] | None:
+        """(4, 4) net to camera; the origin is the scene's node (0, 0)."""
+    @property
+    def nodes(self) -> npt.NDArray[np.float64]:
+        """(N, 2) pixels of all knots in the picture."""
+    @property
+    def lattice(self) -> npt.NDArray[np.int64]:
+        """(N, 2) their lattice indices."""
+    @property
+    def visible(self) -> npt.NDArray[np.bool_]:
+        """(N,) whether nothing is in front of them."""
+
+def scenarios() -> list[tuple[str, str]]: ...
+def render(scenario: str, frame: int = 0, seed: int | None = None) -> SimFrame: ...

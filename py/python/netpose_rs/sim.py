@@ -1,0 +1,8 @@
+"""Virtual nets with known pose.
+
+``scenarios()`` lists names and descriptions; ``render(name, frame, seed)`` draws a frame and gives its exact truth.
+"""
+
+from netpose_rs._core import SimFrame, render, scenarios
+
+__all__ = ["SimFrame", "render", "scenarios"]

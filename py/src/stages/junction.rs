@@ -1,0 +1,82 @@
+//! `netpose_rs.junction`
+
+use net_geometry::Pose;
+use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
+use net_junction::{Config, Expectation, ExpectedNet, JunctionDetector};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{GrayArgument, array2};
+use crate::camera::{Camera, Mesh, value_error};
+use crate::estimate::index_or_unnamed;
+use crate::stages::pixels;
+
+/// Junctions of one picture by the contours of its meshes.
+#[pyclass(frozen, module = "netpose_rs.junction")]
+pub struct Junctions {
+    junctions: Vec<net_geometry::Junction>,
+    boxes: Vec<f64>,
+}
+
+#[pymethods]
+impl Junctions {
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        pixels(py, self.junctions.iter().map(|j| j.pixel))
+    }
+    #[getter]
+    fn lattice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let names = self.junctions.iter().flat_map(index_or_unnamed).collect();
+        array2(py, names, self.junctions.len(), 2)
+    }
+    #[getter]
+    fn sigma_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.junctions.iter().map(|j| j.sigma_px).collect::<Vec<_>>().to_pyarray(py)
+    }
+    #[getter]
+    fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.boxes.to_pyarray(py).reshape([self.boxes.len() / 8, 4, 2])
+    }
+}
+
+/// Finds junctions. With `camera`, `mesh` and `pose` (4, 4) given, meshes of the predicted size and shape are looked for.
+#[pyfunction]
+#[pyo3(signature = (image, camera=None, mesh=None, pose=None))]
+pub fn detect(
+    py: Python<'_>,
+    image: GrayArgument<'_>,
+    camera: Option<&Camera>,
+    mesh: Option<&Mesh>,
+    pose: Option<PyReadonlyArray2<'_, f64>>,
+) -> PyResult<Junctions> {
+    let view = image.view()?;
+    let expectation = match (camera, mesh, pose) {
+        (None, None, None) => None,
+        (Some(camera), Some(mesh), Some(pose)) => {
+            let pose = read_pose(&pose)?;
+            Some(Expectation::Net(ExpectedNet { camera: camera.inner, mesh: mesh.inner, pose, anchored: true }))
+        }
+        _ => return Err(PyValueError::new_err("camera, mesh and pose go together: give all three or none")),
+    };
+    py.detach(|| {
+        let mut detector = JunctionDetector::new(view.width(), view.height(), &Config::default())?;
+        let junctions = detector.detect(view, expectation.as_ref())?.to_vec();
+        let boxes = detector.boxes().flat_map(|b| b.corners).flat_map(|p| [p.x, p.y]).collect();
+        Ok(Junctions { junctions, boxes })
+    })
+    .map_err(|error: net_junction::Error| value_error(error))
+}
+
+fn read_pose(pose: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
+    let m = pose.as_array();
+    if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
+        return Err(PyValueError::new_err(format!("pose: expected finite numbers of shape (4, 4), got {:?}", m.shape())));
+    }
+    let rotation = Matrix3::from_fn(|r, c| m[(r, c)]);
+    if (rotation * rotation.transpose() - Matrix3::identity()).amax() > 1e-6 || rotation.determinant() < 0.0 {
+        return Err(PyValueError::new_err("pose: its upper left 3 x 3 is not a rotation"));
+    }
+    let translation = Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)]);
+    Ok(Pose { rotation: Rotation3::from_matrix_unchecked(rotation), translation })
+}
