@@ -16,6 +16,9 @@ pub enum Error {
     /// The lattice estimator.
     #[error(transparent)]
     Lattice(#[from] net_lattice::Error),
+    /// The junction detectors.
+    #[error(transparent)]
+    Junction(#[from] net_junction::Error),
     /// A time that does not come after the one before.
     #[error("frame time {timestamp_ns} ns does not come after the frame before, {previous_ns} ns")]
     TimeOrder {

@@ -1,8 +1,10 @@
 //! The precise way: one lattice on one sheet over the whole picture, followed from frame to frame.
 
-use net_geometry::{Camera, Junction, JunctionState, Mesh};
+use net_geometry::nalgebra::Vector2;
+use net_geometry::{Camera, Junction, Mesh};
 use net_image::GrayView;
-use net_lattice::{LatticeEstimate, LatticeEstimator, Node};
+use net_junction::{AdjustConfig, LatticeMap, NetAdjuster};
+use net_lattice::{LatticeEstimate, LatticeEstimator};
 
 use crate::error::Result;
 use crate::estimate::{NetPose, Sheet};
@@ -16,7 +18,7 @@ pub(crate) struct LatticeMethod {
     threshold: f64,
     motion: Motion,
     track: Track,
-    nodes: Vec<Node>,
+    adjuster: NetAdjuster,
 }
 
 /// Distance, cells, between predicted and found lattice above which a count is not carried over a gap.
@@ -29,7 +31,7 @@ impl LatticeMethod {
             threshold: config.probability_threshold,
             motion: Motion::default(),
             track: Track::default(),
-            nodes: Vec::new(),
+            adjuster: NetAdjuster::new(camera.width() as usize, camera.height() as usize, &AdjustConfig::default())?,
         })
     }
 
@@ -58,27 +60,46 @@ impl LatticeMethod {
         if estimate.probability >= self.threshold {
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
-            self.list_junctions(&estimate, junctions);
+            self.list_junctions(image, &estimate, junctions)?;
         }
         Ok(Some(Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() }))
     }
 
-    /// The nodes in view, where the sheet says they are.
-    fn list_junctions(&mut self, estimate: &LatticeEstimate, junctions: &mut Vec<Junction>) {
-        estimate.nodes_in_view(self.estimator.camera(), &mut self.nodes);
-        junctions.extend(self.nodes.iter().map(|node| Junction {
-            pixel: node.pixel,
-            index: Some(node.index),
-            sigma_px: NODE_JITTER_CELLS.hypot(NODE_NOISE_PX / node.cell_px) * node.cell_px,
-            state: JunctionState::Seen,
-        }));
+    /// The knots in view: predicted by the sheet, adjusted to the picture one by one.
+    fn list_junctions(
+        &mut self,
+        image: GrayView<'_>,
+        estimate: &LatticeEstimate,
+        junctions: &mut Vec<Junction>,
+    ) -> Result<()> {
+        let map = SheetMap { estimate, camera: self.estimator.camera() };
+        junctions.extend_from_slice(self.adjuster.adjust(image, &map)?);
+        Ok(())
     }
 }
 
-/// How far knots of a made net lie from their lattice, cells: 1 to 2 % is what twine and knotting leave.
-const NODE_JITTER_CELLS: f64 = 0.02;
-/// What the lattice's own place in the picture leaves, px.
-const NODE_NOISE_PX: f64 = 0.1;
+/// The fitted sheet as a prediction of every node's pixel.
+struct SheetMap<'a> {
+    estimate: &'a LatticeEstimate,
+    camera: &'a Camera,
+}
+
+impl LatticeMap for SheetMap<'_> {
+    fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
+        self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j)).map(|(pixel, _)| pixel)
+    }
+
+    fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
+        let (_, depth) = self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j))?;
+        Some(0.5 * (self.camera.fx() + self.camera.fy()) / depth)
+    }
+
+    fn seed(&self) -> Option<(i32, i32)> {
+        let axis = Vector2::new(self.camera.cx(), self.camera.cy());
+        let at = self.estimate.lattice_from_pixel(self.camera, axis).filter(|at| at.amax() < 1e6)?;
+        Some((at.x.round() as i32, at.y.round() as i32))
+    }
+}
 
 fn net_pose(e: &LatticeEstimate) -> NetPose {
     let normal = e.pose.normal();
