@@ -9,6 +9,8 @@ pub enum Method {
     /// One lattice on one bent sheet, fitted to the whole picture and followed from frame to frame.
     #[default]
     Lattice,
+    /// Spectra of sections, junctions of contours, motion by block matching: Strandenes 2023, the baseline of the literature.
+    Thesis,
 }
 
 impl std::str::FromStr for Method {
@@ -17,6 +19,7 @@ impl std::str::FromStr for Method {
     fn from_str(name: &str) -> Result<Self> {
         match name {
             "lattice" => Ok(Self::Lattice),
+            "thesis" => Ok(Self::Thesis),
             _ => Err(Error::Method { name: name.to_owned() }),
         }
     }
@@ -30,6 +33,8 @@ pub struct Config {
     pub method: Method,
     /// Of [`Method::Lattice`].
     pub lattice: net_lattice::Config,
+    /// Of [`Method::Thesis`].
+    pub thesis: net_fft::ThesisConfig,
 }
 
 impl Config {
@@ -38,6 +43,7 @@ impl Config {
     /// # Errors
     /// [`crate::Error`] names the field and the value.
     pub fn validate(&self) -> Result<()> {
-        Ok(self.lattice.validate()?)
+        self.lattice.validate()?;
+        Ok(self.thesis.validate()?)
     }
 }

@@ -16,6 +16,12 @@ pub enum Error {
     /// The lattice estimator.
     #[error(transparent)]
     Lattice(#[from] net_lattice::Error),
+    /// The thesis's estimator.
+    #[error(transparent)]
+    Thesis(#[from] net_fft::Error),
+    /// The block-matching tracker.
+    #[error(transparent)]
+    Flow(#[from] net_flow::Error),
     /// The junction detectors.
     #[error(transparent)]
     Junction(#[from] net_junction::Error),

@@ -5,6 +5,7 @@ use crate::config::{Config, Method};
 use crate::error::{Error, Result};
 use crate::estimate::{Estimate, Status};
 use crate::method::lattice::LatticeMethod;
+use crate::method::thesis::{PROBABILITY_THRESHOLD, ThesisMethod};
 
 /// Follows one net through the frames of one camera. Owns all buffers: after the first frames an update allocates nothing.
 #[derive(Debug)]
@@ -19,19 +20,24 @@ pub struct Tracker {
 #[derive(Debug)]
 enum Engine {
     Lattice(Box<LatticeMethod>),
+    Thesis(Box<ThesisMethod>),
 }
 
 impl Tracker {
     /// A tracker for pictures of `camera` that show a net of `mesh`.
     ///
     /// # Errors
-    /// [`Error::Lattice`] for a parameter out of range.
+    /// [`Error::Lattice`] or [`Error::Thesis`] for a parameter out of range.
     pub fn new(camera: Camera, mesh: Mesh, config: &Config) -> Result<Self> {
         config.validate()?;
         let (method, threshold) = match config.method {
             Method::Lattice => {
                 let method = LatticeMethod::new(&camera, &mesh, &config.lattice)?;
                 (Engine::Lattice(Box::new(method)), config.lattice.probability_threshold)
+            }
+            Method::Thesis => {
+                let method = ThesisMethod::new(&camera, &mesh, &config.thesis)?;
+                (Engine::Thesis(Box::new(method)), PROBABILITY_THRESHOLD)
             }
         };
         Ok(Self { camera, method, threshold, previous_ns: None, junctions: Vec::new() })
@@ -53,6 +59,7 @@ impl Tracker {
         self.junctions.clear();
         let found = match &mut self.method {
             Engine::Lattice(method) => method.update(image, timestamp_ns, &mut self.junctions)?,
+            Engine::Thesis(method) => method.update(image, &mut self.junctions)?,
         };
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);

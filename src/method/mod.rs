@@ -1,6 +1,7 @@
 //! The ways to a pose: same inputs, same [`Found`].
 
 pub(crate) mod lattice;
+pub(crate) mod thesis;
 
 use crate::estimate::NetPose;
 

@@ -11,6 +11,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod cell;
 mod error;
 mod extrema;
 mod fft2;
@@ -21,7 +22,9 @@ mod peaks;
 mod score;
 mod sections;
 mod spectrum;
+mod thesis;
 
+pub use cell::{Choice, cell_poses, choose_pair, ordered_basis};
 pub use error::{Error, Result};
 pub use extrema::RunningExtrema;
 pub use fft2::{HalfSpectrum, RealFft2};
@@ -32,3 +35,4 @@ pub use peaks::{Peak, PeakConfig, PeakFinder};
 pub use score::{Candidate, ScoreConfig, score_peaks};
 pub use sections::{GridConfig, SectionView};
 pub use spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};
+pub use thesis::{PlaneThrough, SectionPose, ThesisConfig, ThesisEstimate, ThesisEstimator};

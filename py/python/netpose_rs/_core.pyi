@@ -6,7 +6,7 @@ import numpy.typing as npt
 
 #: uint8, (H, W) grey or (H, W, 3) RGB. Grey with contiguous rows is read in place, anything else is converted once.
 Image = npt.NDArray[np.uint8]
-Method = Literal["lattice"]
+Method = Literal["lattice", "thesis"]
 
 @final
 class Camera:

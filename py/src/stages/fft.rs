@@ -48,8 +48,7 @@ pub fn peaks<'py>(
     cluster: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let view = spectrum.view()?;
-    let config =
-        PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster, ..PeakConfig::default() };
+    let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
     config.validate().map_err(value_error)?;
     let rows: Vec<f64> = py.detach(|| {
         let middle = (view.width() / 2, view.height() / 2);
@@ -72,8 +71,7 @@ pub fn scores<'py>(
     cluster: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let view = spectrum.view()?;
-    let config =
-        PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster, ..PeakConfig::default() };
+    let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
     config.validate().map_err(value_error)?;
     let rows: Vec<f64> = py.detach(|| {
         let (width, height) = (view.width(), view.height());

@@ -71,7 +71,10 @@ pub fn detect(
 fn read_pose(pose: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
     let m = pose.as_array();
     if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
-        return Err(PyValueError::new_err(format!("pose: expected finite numbers of shape (4, 4), got {:?}", m.shape())));
+        return Err(PyValueError::new_err(format!(
+            "pose: expected finite numbers of shape (4, 4), got {:?}",
+            m.shape()
+        )));
     }
     let rotation = Matrix3::from_fn(|r, c| m[(r, c)]);
     if (rotation * rotation.transpose() - Matrix3::identity()).amax() > 1e-6 || rotation.determinant() < 0.0 {
