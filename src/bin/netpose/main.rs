@@ -1,2 +1,55 @@
-//! The command line.
-fn main() {}
+//! `netpose`: where is the net? One file per command; results on standard output or in files, everything else on standard error.
+
+mod describe;
+mod draw;
+mod eval;
+mod failure;
+mod image;
+mod info;
+mod interrupt;
+mod options;
+mod progress;
+mod reproduce;
+mod run;
+mod sim;
+mod stats;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Where is the net? Pose, junctions and motion of a fish net from one camera.
+#[derive(Parser)]
+#[command(
+    version,
+    about,
+    max_term_width = 110,
+    after_help = "\
+Exit status: 0 done (frames without a net are no errors), 1 the run failed or a frame could not be read, 2 wrong usage."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::Args),
+    Image(image::Args),
+    Sim(sim::Args),
+    Eval(eval::Args),
+    Info(info::Args),
+    Reproduce(reproduce::Args),
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Run(args) => run::main(&args),
+        Command::Image(args) => image::main(&args),
+        Command::Sim(args) => sim::main(&args),
+        Command::Eval(args) => eval::main(&args),
+        Command::Info(args) => info::main(&args),
+        Command::Reproduce(args) => reproduce::main(&args),
+    };
+    failure::exit_code(done)
+}

@@ -51,6 +51,8 @@ pub struct LogSummary {
     pub topic: Option<String>,
     /// Frames in the whole log, where it tells.
     pub frames: Option<u64>,
+    /// Which part was read: `all`, or the bounds and the stride. A run is resumed only with the same.
+    pub part: String,
     /// Where the times come from; says so if they are made up.
     pub times: String,
     /// What was wrong with the log itself.

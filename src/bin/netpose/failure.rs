@@ -1,0 +1,42 @@
+//! How a command ends.
+
+use std::process::ExitCode;
+
+/// Wrong usage that the argument parser cannot see; exit status 2.
+#[derive(Debug)]
+pub struct Usage(pub String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// What a finished command says of its input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All of it was read.
+    Complete,
+    /// Results stand, but part of the input could not be read, or the command was stopped: exit status 1.
+    Partial,
+}
+
+/// Prints an error once, with all its causes, and chooses the exit status.
+pub fn exit_code(done: anyhow::Result<Outcome>) -> ExitCode {
+    match done {
+        Ok(Outcome::Complete) => ExitCode::SUCCESS,
+        Ok(Outcome::Partial) => ExitCode::FAILURE,
+        // The reader of our output has gone (`netpose ... | head`): nobody is left to be told.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+        }
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,229 @@
+//! The folder that a run writes: made, resumed or refused; then frame after frame; then closed, however the run ended.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use net_image::Image;
+use net_log::{
+    DEFAULT_CAMERA_FRAME, NetColumns, PoseRow, RawFrame, RowStatus, RunFiles, RunPaths, RunSummary, TimingHistogram,
+    write_report,
+};
+use netpose::{Camera, Status};
+
+use super::examples::Examples;
+use super::frames::Tracked;
+use crate::draw::Overlay;
+use crate::failure::Outcome;
+
+/// Columns of `poses.csv` behind the usual ones: the count of cells, and how the net hangs where the method estimates it.
+const APPENDED: [&str; 5] =
+    ["track", "crossing_angle_deg", "sigma_crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m"];
+
+/// What to do with what is in the folder already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it, and refuse to run.
+    Keep,
+    /// Go on behind it.
+    Resume,
+    /// Write over it.
+    Replace,
+}
+
+/// Results, their summary and what is measured on the way.
+pub struct Folder {
+    files: RunFiles,
+    summary: RunSummary,
+    camera: Camera,
+    last_frame: Option<u64>,
+    examples: Examples,
+    decoding: TimingHistogram,
+    tracking: TimingHistogram,
+    writing: TimingHistogram,
+    start: Instant,
+}
+
+impl Folder {
+    /// Makes the folder, or opens it where an earlier run into it may be resumed or replaced. `summary` is what is known before
+    /// the first frame.
+    pub fn prepare(dir: &Path, existing: Existing, camera: Camera, mut summary: RunSummary) -> Result<Self> {
+        let paths = RunPaths::new(dir);
+        let holds_a_run = paths.poses().exists() || paths.summary().exists();
+        if holds_a_run && existing == Existing::Keep {
+            bail!("{} already holds a run: --resume goes on with it, --force replaces it", dir.display());
+        }
+        let (files, rows) = if holds_a_run && existing == Existing::Resume {
+            let earlier = RunSummary::read(&paths.summary())?;
+            check_same(&earlier, &summary)?;
+            summary.unreadable = earlier.unreadable;
+            RunFiles::resume(dir, &APPENDED)?
+        } else {
+            (RunFiles::create(dir, &APPENDED)?, Vec::new())
+        };
+        let last_frame = rows.last().map(|row| row.frame);
+        for row in &rows {
+            summary.count(row.status);
+        }
+        summary.unreadable.retain(|u| last_frame.is_some_and(|last| u.frame <= last));
+        summary.write(&paths.summary())?;
+        let (decoding, tracking, writing) = Default::default();
+        let examples = Examples::default();
+        Ok(Self { files, summary, camera, last_frame, examples, decoding, tracking, writing, start: Instant::now() })
+    }
+
+    /// Number of the last frame that an earlier run did.
+    pub fn last_frame(&self) -> Option<u64> {
+        self.last_frame
+    }
+
+    /// Frames so far, those of the runs that are resumed included.
+    pub fn frames(&self) -> u64 {
+        self.summary.frames.values().sum()
+    }
+
+    /// `97 ok, 2 no_net, 1 unreadable`.
+    pub fn counts(&self) -> String {
+        counts(&self.summary)
+    }
+
+    /// Writes one frame's results.
+    pub fn write(&mut self, frame: &RawFrame, decoding: Duration, tracked: Result<&Tracked, &str>) -> Result<()> {
+        let start = Instant::now();
+        self.decoding.add(milliseconds(decoding));
+        let row = match tracked {
+            Ok(tracked) => row(frame, tracked),
+            Err(_) => PoseRow::unreadable(frame.index, &frame.name, frame.timestamp_ns),
+        };
+        match tracked {
+            Ok(tracked) => self.tracking.add(milliseconds(tracked.latency)),
+            Err(why) => self.summary.name_unreadable(frame.index, &frame.name, &why),
+        }
+        self.files.write(&row, tracked.map_or(&[][..], |t| &t.junctions))?;
+        self.summary.count(row.status);
+        self.writing.add(milliseconds(start.elapsed()));
+        Ok(())
+    }
+
+    /// Keeps the frame for the report, if it is one of the telling ones.
+    pub fn consider(&mut self, frame: u64, image: &Image<u8>, tracked: &Tracked) {
+        self.examples.consider(frame, image, tracked);
+    }
+
+    /// Closes all files and makes the report. Where the run failed, the results so far are closed as well before the failure is passed on.
+    pub fn finish(mut self, run: Result<Ended>, damage: &[String], overlay: &Overlay) -> Result<Finished> {
+        let paths = self.files.paths().clone();
+        self.summary.finished = matches!(run, Ok(Ended::AtTheEnd));
+        self.summary.log.damage = damage.to_vec();
+        self.summary.elapsed_s = self.start.elapsed().as_secs_f64();
+        for (stage, times) in [("decode", &self.decoding), ("track", &self.tracking), ("write", &self.writing)] {
+            self.summary.timing_ms.insert(stage.to_owned(), times.timing());
+        }
+        let closed = self.files.finish(&self.camera, DEFAULT_CAMERA_FRAME);
+        let recorded = self.summary.write(&paths.summary());
+        let reported =
+            closed.and(recorded).and_then(|()| write_report(&paths, &self.summary, &self.examples.draw(overlay)));
+        let ended = run?;
+        reported?;
+        Ok(Finished { summary: self.summary, ended, dir: paths.dir })
+    }
+}
+
+/// How the loop over the frames ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    AtTheEnd,
+    /// By Ctrl-C or its kin.
+    Stopped,
+}
+
+/// A run whose files are closed.
+pub struct Finished {
+    summary: RunSummary,
+    ended: Ended,
+    dir: PathBuf,
+}
+
+impl Finished {
+    /// The run in a line.
+    pub fn line(&self) -> String {
+        let frames: u64 = self.summary.frames.values().sum();
+        let end = if self.ended == Ended::Stopped { " (stopped; --resume goes on from there)" } else { "" };
+        format!("{frames} frames: {}; results in {}{end}", counts(&self.summary), self.dir.display())
+    }
+
+    /// Complete if all frames were read.
+    pub fn outcome(&self) -> Outcome {
+        let unreadable = self.summary.frames_of(RowStatus::Unreadable);
+        if self.ended == Ended::Stopped || unreadable > 0 { Outcome::Partial } else { Outcome::Complete }
+    }
+}
+
+fn counts(summary: &RunSummary) -> String {
+    let all = [RowStatus::Ok, RowStatus::NoNet, RowStatus::Unreadable];
+    all.map(|status| format!("{} {}", summary.frames_of(status), status.as_str())).join(", ")
+}
+
+/// Refuses to go on with a run that was about something else.
+fn check_same(earlier: &RunSummary, now: &RunSummary) -> Result<()> {
+    let parts = |s: &RunSummary| {
+        serde_json::to_value(s).context("cannot compare with the earlier run").map(|mut value| {
+            // Counted and found on the way; all else must agree.
+            for path in ["/log/damage", "/log/frames", "/arguments"] {
+                value.pointer_mut(path).map(serde_json::Value::take);
+            }
+            value
+        })
+    };
+    let (earlier, now) = (parts(earlier)?, parts(now)?);
+    for part in ["version", "log", "camera", "mesh", "config"] {
+        let (was, is) = (&earlier[part], &now[part]);
+        if was != is {
+            bail!("cannot resume: {part} was {was}, and now is {is}; --force starts anew");
+        }
+    }
+    Ok(())
+}
+
+fn row(frame: &RawFrame, tracked: &Tracked) -> PoseRow {
+    let net = tracked.net.map(|net| NetColumns {
+        range_m: net.range_m,
+        distance_m: net.distance_m,
+        normal: net.normal,
+        pose: net.pose,
+        sigma_range_m: net.sigma_range_m,
+        sigma_tilt_deg: net.sigma_tilt.to_degrees(),
+        sigma_xy_m: net.sigma_xy_m,
+    });
+    PoseRow {
+        frame: frame.index,
+        file: frame.name.to_string(),
+        timestamp_ns: frame.timestamp_ns,
+        status: match tracked.status {
+            Status::Ok => RowStatus::Ok,
+            Status::NoNet => RowStatus::NoNet,
+        },
+        probability: Some(tracked.probability),
+        net,
+        junctions: Some(tracked.junctions.len() as u64),
+        latency_ms: Some(milliseconds(tracked.latency)),
+        appended: appended(tracked),
+    }
+}
+
+fn appended(tracked: &Tracked) -> Vec<f64> {
+    // NaN is an empty cell.
+    let mut cells = vec![f64::NAN; APPENDED.len()];
+    let Some(net) = &tracked.net else { return cells };
+    cells[0] = f64::from(tracked.track);
+    if let Some(sheet) = &net.sheet {
+        cells[1] = sheet.crossing_angle.to_degrees();
+        cells[2] = sheet.sigma_crossing_angle.to_degrees();
+        cells[3..].copy_from_slice(&sheet.curvatures_per_m);
+    }
+    cells
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    1e3 * time.as_secs_f64()
+}

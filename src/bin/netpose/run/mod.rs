@@ -1,0 +1,133 @@
+//! `netpose run`: a whole log through the tracker, results into a folder.
+
+mod ahead;
+mod examples;
+mod folder;
+mod frames;
+mod overlays;
+
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use net_log::{LogInfo, LogSummary, OpenOptions, RunSummary, TimeBound};
+
+use crate::describe::{self, times};
+use crate::failure::Outcome;
+use crate::interrupt::Interrupt;
+use crate::options::Setup;
+use folder::{Existing, Folder};
+
+/// Where the net is, frame by frame, in a log of images.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A folder of images, an MCAP file or a folder of MCAP files
+    log: PathBuf,
+    /// Folder for the results; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    setup: Setup,
+    /// Image topic of an MCAP; needed only where there are several
+    #[arg(long, value_name = "NAME")]
+    topic: Option<String>,
+    /// First time to read: seconds after the log's first frame (12.5), or nanoseconds since 1970 (16 digits or more)
+    #[arg(long, value_name = "T")]
+    from: Option<TimeBound>,
+    /// Last time to read, in the same forms
+    #[arg(long, value_name = "T")]
+    to: Option<TimeBound>,
+    /// Read every N-th frame only
+    #[arg(long, value_name = "N", default_value = "1")]
+    stride: NonZeroU64,
+    /// Frames per second of an image folder without times: they are then made up, and the output says so
+    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+    fps: f64,
+    /// Threads that decode frames and draw overlays; results are the same for any number. Default: one for each core
+    #[arg(long, value_name = "N")]
+    jobs: Option<std::num::NonZeroUsize>,
+    /// Write a picture for each frame into DIR/overlay: lattice, junctions, axes, status
+    #[arg(long)]
+    overlay: bool,
+    /// Go on where an earlier run into the same folder stopped
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Replace the results of an earlier run in the same folder
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Result<Outcome> {
+    let mesh = args.setup.mesh()?;
+    let config = args.setup.config()?;
+    let log = net_log::open(&args.log, &args.open_options())?;
+    let camera = args.setup.camera(log.info())?;
+    eprintln!("{}", describe::log(log.info()));
+    eprintln!("camera: {}", camera.origin);
+    let interrupt = Interrupt::listen()?;
+    let job = frames::Job {
+        camera: camera.camera,
+        mesh,
+        config,
+        threads: args.threads(),
+        overlay: args.overlay.then(|| args.out.join("overlay")),
+    };
+    let folder =
+        Folder::prepare(&args.out, args.existing(), job.camera, args.summary(&job, &camera.origin, log.info())?)?;
+    let finished = frames::process(log, &job, folder, &interrupt)?;
+    println!("{}", finished.line());
+    Ok(finished.outcome())
+}
+
+impl Args {
+    fn open_options(&self) -> OpenOptions {
+        OpenOptions { topic: self.topic.clone(), fps: self.fps, from: self.from, to: self.to, stride: self.stride }
+    }
+
+    fn existing(&self) -> Existing {
+        match (self.resume, self.force) {
+            (true, _) => Existing::Resume,
+            (_, true) => Existing::Replace,
+            _ => Existing::Keep,
+        }
+    }
+
+    /// What `run.json` says before the first frame.
+    fn summary(&self, job: &frames::Job, camera_origin: &str, log: &LogInfo) -> Result<RunSummary> {
+        Ok(RunSummary {
+            version: env!("CARGO_PKG_VERSION").into(),
+            arguments: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
+            log: LogSummary {
+                path: self.log.display().to_string(),
+                kind: log.kind.as_str().into(),
+                topic: log.topic.clone(),
+                frames: log.frames,
+                part: self.part(),
+                times: times(log),
+                ..LogSummary::default()
+            },
+            camera: describe::camera_json(&job.camera, camera_origin),
+            mesh: describe::mesh(&job.mesh),
+            config: serde_json::to_value(&job.config).context("cannot write the configuration")?,
+            ..RunSummary::default()
+        })
+    }
+
+    /// The part of the log that is read, in words.
+    fn part(&self) -> String {
+        let time = |name: &str, bound: Option<TimeBound>| match bound {
+            Some(TimeBound::AfterStart(ns)) => format!("{name} {} s after the start, ", ns as f64 * 1e-9),
+            Some(TimeBound::Epoch(ns)) => format!("{name} {ns} ns, "),
+            None => String::new(),
+        };
+        match (self.from, self.to, self.stride.get()) {
+            (None, None, 1) => "all".into(),
+            (from, to, stride) => format!("{}{}every frame of {stride}", time("from", from), time("to", to)),
+        }
+    }
+
+    fn threads(&self) -> usize {
+        self.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+    }
+}

@@ -1,0 +1,116 @@
+//! Logs that are damaged: the rest stands, and the exit status says that something is missing.
+
+use crate::support::{STATUS, Scratch, assert_says, assert_status, netpose, png};
+
+#[test]
+fn a_corrupt_image_in_the_middle_is_one_unreadable_row() {
+    let scratch = Scratch::new();
+    scratch.image_log(6, 96, 64);
+    let whole = png(96, 64, 9);
+    scratch.write("log/f002.png", &whole[..whole.len() / 2]);
+    scratch.write("log/f004.png", b"");
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["f002.png", "f004.png", "unreadable"]);
+    let rows = scratch.poses();
+    let unreadable: Vec<&str> = rows.iter().filter(|r| r[STATUS] == "unreadable").map(|r| r[1].as_str()).collect();
+    assert_eq!((rows.len(), unreadable), (6, vec!["f002.png", "f004.png"]));
+    assert!(rows[2][4..].iter().all(String::is_empty), "an unreadable row carries no values: {:?}", rows[2]);
+    let record = scratch.record();
+    assert_eq!((record["finished"].as_bool(), record["frames"]["unreadable"].as_u64()), (Some(true), Some(2)));
+    assert_eq!(record["unreadable"][0]["file"], "f002.png");
+}
+
+#[test]
+fn an_empty_folder_is_no_log() {
+    let scratch = Scratch::new();
+    scratch.image_log(1, 32, 24);
+    std::fs::remove_dir_all(scratch.path("log")).unwrap();
+    std::fs::create_dir(scratch.path("log")).unwrap();
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["no images"]);
+    assert!(!scratch.path("out").exists());
+    std::fs::remove_dir(scratch.path("log")).unwrap();
+    assert_status(&scratch.run(&[]), 1);
+}
+
+#[test]
+fn a_picture_of_another_size_is_unreadable_and_the_rest_stands() {
+    let scratch = Scratch::new();
+    scratch.image_log(4, 96, 64);
+    scratch.write("log/f002.png", png(64, 96, 1));
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["f002.png", "96x64", "64x96"]);
+    let status: Vec<String> = scratch.poses().into_iter().map(|r| r[STATUS].clone()).collect();
+    assert_eq!(status, ["no_net", "no_net", "unreadable", "no_net"]);
+}
+
+#[test]
+fn a_camera_of_another_size_ends_the_run_before_any_claim() {
+    let scratch = Scratch::new();
+    scratch.image_log(3, 96, 64);
+    scratch.camera(192, 128);
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["192x128", "96x64", "--camera"]);
+    assert!(scratch.poses().is_empty());
+    assert_eq!(scratch.record()["finished"], false);
+}
+
+#[test]
+fn times_that_run_backwards_are_unreadable_frames() {
+    let scratch = Scratch::new();
+    scratch.image_log(5, 48, 32);
+    scratch.write(
+        "log/timestamps.csv",
+        "file,timestamp_ns\nf000.png,100\nf001.png,200\nf002.png,150\nf003.png,300\nf004.png,400\n",
+    );
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["time", "f00"]);
+    let rows = scratch.poses();
+    assert_eq!(rows.iter().filter(|r| r[STATUS] == "unreadable").count(), 1, "{rows:?}");
+    let times: Vec<i64> = rows.iter().filter(|r| r[STATUS] != "unreadable").map(|r| r[2].parse().unwrap()).collect();
+    assert!(times.is_sorted(), "{times:?}");
+}
+
+#[test]
+fn a_camera_file_that_makes_no_sense_names_field_and_value() {
+    let scratch = Scratch::new();
+    scratch.image_log(1, 32, 24);
+    let good = std::fs::read_to_string(scratch.path("camera.yaml")).unwrap();
+    scratch.write("camera.yaml", good.replace("image_width: 32", "image_width: -32"));
+    let output = scratch.run(&[]);
+    assert_status(&output, 1);
+    assert_says(&output, &["camera.yaml", "image_width", "-32"]);
+}
+
+#[test]
+fn single_images_that_cannot_be_read_do_not_hide_the_others() {
+    let scratch = Scratch::new();
+    let log = scratch.image_log(2, 64, 48);
+    let bad = scratch.write("bad.jpg", [0xFF, 0xD8, 0xFF, 0xE0]);
+    let output = netpose()
+        .arg("image")
+        .args([log.join("f000.png"), bad, log.join("f001.png")])
+        .arg("--camera")
+        .arg(scratch.path("camera.yaml"))
+        .args(["--cell", "50mm", "--json"])
+        .output()
+        .unwrap();
+    assert_status(&output, 1);
+    assert_says(&output, &["bad.jpg"]);
+    let lines = crate::support::stdout(&output);
+    let status: Vec<String> = lines
+        .lines()
+        .map(|line| {
+            serde_json::from_str::<serde_json::Value>(line).expect("nothing but JSON")["status"]
+                .as_str()
+                .unwrap()
+                .to_owned()
+        })
+        .collect();
+    assert_eq!(status, ["no_net", "unreadable", "no_net"]);
+}
