@@ -203,9 +203,18 @@ impl Log {
         &self.info
     }
 
-    /// The most frames that are still to come, where the log tells it: for a progress bar.
+    /// About how many frames will come, where the log tells it: for a progress bar.
     pub fn frames_expected(&self) -> Option<u64> {
-        self.info.frames.map(|n| n.div_ceil(self.selection.options.stride.get()))
+        let OpenOptions { from, to, stride, .. } = &self.selection.options;
+        let (first, last) = self.info.span_ns.unwrap_or((0, 0));
+        let share = |b: &Option<TimeBound>, default: i64| {
+            let time = b.map_or(default, |b| b.epoch_ns(first)).clamp(first, last);
+            (time.abs_diff(first)) as f64 / last.abs_diff(first).max(1) as f64
+        };
+        let part = (share(to, last) - share(from, first)).max(0.0);
+        // Without bounds the number is exact.
+        let frames = |n: u64| if from.is_none() && to.is_none() { n } else { (n as f64 * part).round() as u64 };
+        self.info.frames.map(|n| frames(n).div_ceil(stride.get()))
     }
 
     /// What was wrong with the log itself, as far as it has been read: cut off, a chunk that fails its checksum.
@@ -221,6 +230,9 @@ impl Iterator for Log {
     fn next(&mut self) -> Option<RawFrame> {
         loop {
             let frame = self.frames.next()?;
+            if let Some(from) = self.selection.set_bounds(&frame) {
+                self.frames.source_mut().skip_before(from);
+            }
             match self.selection.judge(&frame) {
                 Choice::Take => return Some(frame),
                 Choice::Skip => {}
@@ -248,12 +260,17 @@ enum Choice {
 }
 
 impl Selection {
+    /// Sets the bounds by the first frame that has a time; returns the first time to take then, if one was asked for.
+    fn set_bounds(&mut self, frame: &RawFrame) -> Option<i64> {
+        let time = frame.timestamp_ns.filter(|_| self.bounds.is_none())?;
+        let bound = |b: Option<TimeBound>| b.map(|b| b.epoch_ns(time));
+        let (from, to) = (bound(self.options.from), bound(self.options.to));
+        self.bounds = Some((from.unwrap_or(i64::MIN), to.unwrap_or(i64::MAX)));
+        from
+    }
+
     fn judge(&mut self, frame: &RawFrame) -> Choice {
-        if let Some(time) = frame.timestamp_ns {
-            let (from, to) = *self.bounds.get_or_insert_with(|| {
-                let bound = |b: Option<TimeBound>, default| b.map_or(default, |b| b.epoch_ns(time));
-                (bound(self.options.from, i64::MIN), bound(self.options.to, i64::MAX))
-            });
+        if let (Some(time), Some((from, to))) = (frame.timestamp_ns, self.bounds) {
             self.in_range = (from..=to).contains(&time);
             // Times in order grow; one out of order says nothing of what follows.
             if time > to && !frame.is_refused() {

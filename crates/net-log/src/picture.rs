@@ -58,7 +58,7 @@ pub(crate) fn check_size(width: u64, height: u64) -> Result<(), FrameError> {
 }
 
 fn decode_jpeg(bytes: &[u8]) -> Result<Image<u8>, FrameError> {
-    let wrong = |why: String| FrameError::Decode { format: "JPEG", why };
+    let wrong = |why: String| FrameError::Decode { format: "JPEG", why: why.trim_end().to_owned() };
     // Strict: otherwise the rest of a cut-off picture comes back as flat grey.
     let options = DecoderOptions::default()
         .set_strict_mode(true)

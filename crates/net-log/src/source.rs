@@ -17,11 +17,18 @@ pub(crate) use timestamps::TIMESTAMPS_CSV;
 pub(crate) trait Source: Iterator<Item = RawFrame> + Send {
     /// What was wrong with the log itself, so far.
     fn damage(&self) -> &[String];
+
+    /// Frames before this time need not come, if that saves work. They count all the same: the frames behind keep their numbers.
+    fn skip_before(&mut self, _timestamp_ns: i64) {}
 }
 
 impl Source for Box<dyn Source> {
     fn damage(&self) -> &[String] {
         (**self).damage()
+    }
+
+    fn skip_before(&mut self, timestamp_ns: i64) {
+        (**self).skip_before(timestamp_ns);
     }
 }
 

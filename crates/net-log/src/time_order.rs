@@ -22,6 +22,10 @@ impl<S: Source> TimeOrder<S> {
     pub(crate) fn source(&self) -> &S {
         &self.source
     }
+
+    pub(crate) fn source_mut(&mut self) -> &mut S {
+        &mut self.source
+    }
 }
 
 impl<S: Source> Iterator for TimeOrder<S> {

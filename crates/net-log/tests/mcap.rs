@@ -361,6 +361,44 @@ fn a_damaged_chunk_costs_its_own_frames_only() {
     assert_eq!((frames.len(), damage.len()), (8, 1), "{damage:?}");
 }
 
+/// What comes before `from` is counted by the index, not read: the numbers stay the same.
+#[test]
+fn frames_keep_their_numbers_wherever_reading_begins() {
+    // Five minutes, so that the times of logging leave no doubt.
+    let entries: Vec<_> =
+        (0..300).map(|i| image_entry("/image", START + i * 1_000_000_000, &picture(9, 7, i as usize))).collect();
+    for summary in [true, false] {
+        let (_dir, path) = file(&mcap_bytes(&entries, Style { summary, chunk_size: 1500, ..Style::default() }));
+        let of = |from: &str, to: Option<&str>| {
+            let options =
+                OpenOptions { from: from.parse().ok(), to: to.and_then(|t| t.parse().ok()), ..OpenOptions::default() };
+            let log = open(&path, &options).unwrap();
+            let expected = log.frames_expected().unwrap();
+            let frames: Vec<_> = log.collect();
+            // The estimate for the progress bar.
+            assert!(expected.abs_diff(frames.len() as u64) <= 1, "{expected} {}", frames.len());
+            for frame in &frames {
+                assert_eq!(frame.timestamp_ns, Some(START + frame.index as i64 * 1_000_000_000));
+                assert_eq!(frame.decode().unwrap(), picture(9, 7, frame.index as usize));
+            }
+            frames.iter().map(|f| f.index).collect::<Vec<_>>()
+        };
+        assert_eq!(of("200s", None), (200..300).collect::<Vec<_>>());
+        assert_eq!(of(&format!("{}ns", START + 250_000_000_000), Some("260")), (250..=260).collect::<Vec<_>>());
+        assert_eq!(of("400", None), [0; 0]);
+    }
+    // Chunks that are passed over are not read: damage in one of them does not show.
+    let mut bytes = mcap_bytes(&entries, Style { chunk_size: 1500, ..Style::default() });
+    let chunk = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes[5].clone();
+    bytes[(chunk.chunk_start_offset + chunk.chunk_length - 3) as usize] ^= 0x55;
+    let (_dir, path) = file(&bytes);
+    for (from, damaged) in [("0", true), ("200", false)] {
+        let mut log = open(&path, &OpenOptions { from: from.parse().ok(), ..OpenOptions::default() }).unwrap();
+        assert_eq!(log.by_ref().last().unwrap().index, 299);
+        assert_eq!(!log.damage().is_empty(), damaged, "{:?}", log.damage());
+    }
+}
+
 #[test]
 fn a_folder_of_files_is_one_log() {
     let entries = images(9);

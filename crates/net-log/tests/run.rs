@@ -83,38 +83,55 @@ fn junctions_read_back_frame_by_frame() {
     let path = dir.path().join("junctions.parquet");
     let mut writer = JunctionsParquet::create(&path).unwrap();
     assert_eq!(read_junctions(&path).unwrap().count(), 0, "whole, and empty, at once");
-    // Enough for several groups, by rows and by frames, with frames that have none.
-    let count = |frame: u64| {
-        if frame.is_multiple_of(3) {
-            0
-        } else if frame < 60 {
-            1200
-        } else {
-            2
-        }
+    // Enough for many groups, by rows and by frames, with frames that have none.
+    let count = |frame: u64| match frame {
+        f if f.is_multiple_of(3) => 0,
+        f if f < 60 => 1200,
+        _ => 1,
     };
-    let mut seen = 0;
-    for frame in 0..1000 {
+    const FRAMES: u64 = 9000;
+    for frame in 0..FRAMES {
         writer.write(frame, &junctions(frame, count(frame))).unwrap();
-        if frame % 100 == 99 {
-            // Read while it is written: what a killed process would have left.
+        if frame % 450 == 449 {
+            // Read while it is written: what a killed process leaves.
             let frames: Vec<_> = read_junctions(&path).unwrap().map(Result::unwrap).collect();
-            assert!(frames.len() >= seen);
-            seen = frames.len();
+            // A group has at most 256 frames with junctions; two thirds of all have some.
+            assert!(frames.len() as u64 + 256 >= (frame + 1) * 2 / 3, "{} of {frame}", frames.len());
             assert!(frames.iter().all(|(f, found)| *found == junctions(*f, count(*f))));
         }
     }
-    assert!(seen > 200, "{seen} frames before the end");
     writer.finish().unwrap();
-    let mut expected = (0..1000).filter(|f: &u64| !f.is_multiple_of(3));
+    let mut expected = (0..FRAMES).filter(|f: &u64| !f.is_multiple_of(3));
     for frame in read_junctions(&path).unwrap() {
         let (number, found) = frame.unwrap();
         assert_eq!(Some(number), expected.next());
         assert_eq!(found, junctions(number, count(number)));
     }
     assert_eq!(expected.next(), None);
-    // 23,778 + 1,260 rows of 45 bytes and less: the footers in between do not count.
-    assert!(std::fs::metadata(&path).unwrap().len() < 1_500_000);
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left beside it");
+}
+
+/// A write that fails half-way, as on a full disk or when the process is killed in it.
+#[test]
+fn a_group_torn_in_the_middle_costs_that_group_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+    let rows: Vec<_> = (0..600_u64).map(|i| frame(5 * i)).collect();
+    rows.iter().for_each(|(row, junctions)| files.write(row, junctions).unwrap());
+    drop(files);
+    let path = dir.path().join("junctions.parquet");
+    let kept = read_junctions(&path).unwrap().count();
+    let journal = std::fs::read(dir.path().join("junctions.parquet.journal")).unwrap();
+    let start = u64::from_le_bytes(*journal.first_chunk().unwrap());
+    // Over the old footer, then nothing.
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes.truncate(start as usize + 5000);
+    std::fs::write(&path, &bytes).unwrap();
+    assert!(read_junctions(&path).is_err());
+    let (_, rows) = RunFiles::resume(dir.path(), &[]).unwrap();
+    let left = read_junctions(&path).unwrap().count();
+    assert!(left > 0 && left + 256 == kept, "{left} of {kept}");
+    assert!(rows.len() < 600 && rows.iter().filter(|r| r.junctions > Some(0)).count() == left);
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! `junctions.parquet`: `frame, u, v, i, j, sigma_px, state`, one row per junction.
 //!
-//! The file is whole at almost any moment: rows go into it in groups, and behind a group goes a footer that covers all groups so
-//! far. The next group is written *behind* that footer, which then is a gap that readers never look at. A process that is killed while
-//! it writes a group leaves a tail that [`recover`] cuts off. Footers become rarer as the file grows, so the gaps stay below a few
-//! percent of it.
+//! The file is whole between any two writes: rows go into it in groups, and a group is written together with a new footer over the
+//! old one, in one piece. What the old footer was is put down beside the file first, so that a process that is killed within that
+//! write, or a disk that fills up, costs this group only: [`recover`] puts the old footer back.
 
 use std::fs::File;
-use std::io::{BufWriter, Read, Seek, SeekFrom};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -28,8 +27,6 @@ use crate::error::{Error, Result};
 const GROUP_ROWS: usize = 1 << 15;
 /// this many frames with junctions, so that little is lost when the process is killed.
 const GROUP_FRAMES: usize = 256;
-/// The four bytes that a Parquet file begins and ends with.
-const MAGIC: &[u8; 4] = b"PAR1";
 
 /// The columns, in the contract's order.
 fn schema() -> TypePtr {
@@ -94,13 +91,55 @@ impl Columns {
     }
 }
 
+/// The file, which is written in whole pieces only.
+#[derive(Debug)]
+struct Pieces {
+    file: File,
+    /// First byte behind the groups: where the footer begins.
+    groups_end: u64,
+    /// What is to be written next.
+    piece: Vec<u8>,
+    /// The footer that is in the file.
+    footer: Vec<u8>,
+    /// Where the footer is put down while the file changes.
+    journal: PathBuf,
+}
+
+impl Write for Pieces {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.piece.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Pieces {
+    /// Writes what has been collected, and the footer behind it.
+    fn commit(&mut self, footer: Vec<u8>) -> std::io::Result<()> {
+        let old = [&self.groups_end.to_le_bytes()[..], &self.footer].concat();
+        std::fs::write(&self.journal, old)?;
+        let groups_end = self.groups_end + self.piece.len() as u64;
+        self.piece.extend_from_slice(&footer);
+        self.file.seek(SeekFrom::Start(self.groups_end))?;
+        self.file.write_all(&self.piece)?;
+        self.piece.clear();
+        (self.groups_end, self.footer) = (groups_end, footer);
+        Ok(())
+    }
+}
+
+/// Where the footer of `path` is put down while the file changes.
+pub(crate) fn journal(path: &Path) -> PathBuf {
+    path.with_extension("parquet.journal")
+}
+
 /// Writes `junctions.parquet`. Memory does not grow with the file, but for about 1 kB per 32,768 rows.
 pub struct JunctionsParquet {
     path: PathBuf,
-    writer: SerializedFileWriter<BufWriter<File>>,
+    writer: SerializedFileWriter<Pieces>,
     rows: Columns,
-    /// Number of groups at which the next footer is due.
-    next_footer: usize,
 }
 
 impl std::fmt::Debug for JunctionsParquet {
@@ -116,16 +155,17 @@ impl JunctionsParquet {
     /// [`Error::Io`] names the path.
     pub fn create(path: &Path) -> Result<Self> {
         let file = File::create(path).map_err(Error::io("create", path))?;
+        let pieces = Pieces { file, groups_end: 0, piece: Vec::new(), footer: Vec::new(), journal: journal(path) };
         let properties = WriterProperties::builder()
             .set_created_by(concat!("netpose ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::SNAPPY)
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
             .build();
-        let writer = SerializedFileWriter::new(BufWriter::new(file), schema(), Arc::new(properties));
-        let writer = writer.map_err(failed("write", path))?;
-        let mut this = Self { path: path.to_owned(), writer, rows: Columns::default(), next_footer: 1 };
-        this.write_footer()?;
+        let writer =
+            SerializedFileWriter::new(pieces, schema(), Arc::new(properties)).map_err(failed("write", path))?;
+        let mut this = Self { path: path.to_owned(), writer, rows: Columns::default() };
+        this.commit()?;
         Ok(this)
     }
 
@@ -149,23 +189,16 @@ impl JunctionsParquet {
         if self.rows.frame.len() < GROUP_ROWS && self.rows.frames < GROUP_FRAMES {
             return Ok(());
         }
-        self.write_group()?;
-        let groups = self.writer.flushed_row_groups().len();
-        if groups >= self.next_footer {
-            self.write_footer()?;
-            // Every group at first, then every seventeenth part of the file.
-            self.next_footer = groups + 1 + groups / 16;
-        }
-        Ok(())
+        self.checkpoint()
     }
 
-    /// Writes what there is, with a footer, so that the file is whole.
+    /// Writes what there is, so that all of it is in the file.
     ///
     /// # Errors
     /// [`Error::Io`] names the path.
     pub fn checkpoint(&mut self) -> Result<()> {
         self.write_group()?;
-        self.write_footer()
+        self.commit()
     }
 
     /// Writes what is left and closes the file.
@@ -173,8 +206,9 @@ impl JunctionsParquet {
     /// # Errors
     /// [`Error::Io`] names the path.
     pub fn finish(mut self) -> Result<()> {
-        self.write_group()?;
-        self.writer.finish().map(drop).map_err(failed("write", &self.path))
+        self.checkpoint()?;
+        let journal = journal(&self.path);
+        std::fs::remove_file(&journal).map_err(Error::io("remove", &journal))
     }
 
     fn write_group(&mut self) -> Result<()> {
@@ -207,8 +241,9 @@ impl JunctionsParquet {
         Ok(())
     }
 
-    /// Writes a footer that covers all groups so far, and hands it all to the system.
-    fn write_footer(&mut self) -> Result<()> {
+    /// Writes the groups that are not in the file yet, with a footer that covers all groups.
+    fn commit(&mut self) -> Result<()> {
+        self.writer.flush().map_err(Error::io("write", &self.path))?;
         let groups = self.writer.flushed_row_groups().to_vec();
         let rows = groups.iter().map(|g| g.num_rows()).sum();
         let created_by = Some(self.writer.properties().created_by().to_owned());
@@ -217,7 +252,7 @@ impl JunctionsParquet {
         let metadata = ParquetMetaDataBuilder::new(metadata).set_row_groups(groups).build();
         let mut footer = Vec::new();
         ParquetMetaDataWriter::new(&mut footer, &metadata).finish().map_err(failed("write", &self.path))?;
-        self.writer.write_all(&footer).and_then(|()| self.writer.flush()).map_err(Error::io("write", &self.path))
+        self.writer.inner_mut().commit(footer).map_err(Error::io("write", &self.path))
     }
 }
 
@@ -342,45 +377,25 @@ fn read_group(reader: &SerializedFileReader<File>, index: usize) -> parquet::err
         .collect()
 }
 
-/// Cuts a file that was torn while it was written back to its last footer. `false` if there is none, or no file.
+/// Puts the old footer back to a file that was torn while a group was written to it. `false` if there is no file, or if it is
+/// beyond help.
 ///
 /// # Errors
 /// [`Error::Io`] names the path.
-pub(crate) fn recover(path: &Path) -> Result<bool> {
-    let open = std::fs::OpenOptions::new().read(true).write(true).open(path);
-    let mut file = match open {
+pub(crate) fn recover(path: &Path, journal: &Path) -> Result<bool> {
+    let whole = || File::open(path).is_ok_and(|f| SerializedFileReader::new(f).is_ok());
+    if whole() {
+        return Ok(true);
+    }
+    let Ok(old) = std::fs::read(journal) else { return Ok(false) };
+    let Some((groups_end, footer)) = old.split_first_chunk() else { return Ok(false) };
+    let mut file = match std::fs::OpenOptions::new().write(true).open(path) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
-        other => other.map_err(Error::io("read", path))?,
+        other => other.map_err(Error::io("write", path))?,
     };
-    let mut end = file.metadata().map_err(Error::io("read", path))?.len();
-    loop {
-        let whole = file.try_clone().ok().and_then(|f| SerializedFileReader::new(f).ok());
-        if whole.is_some() {
-            return Ok(true);
-        }
-        let Some(footer_end) = last_magic(&mut file, end.saturating_sub(1)).map_err(Error::io("read", path))? else {
-            return Ok(false);
-        };
-        end = footer_end;
-        file.set_len(end).map_err(Error::io("write", path))?;
-    }
-}
-
-/// End of the last [`MAGIC`] that ends at or before `end`, but for the one at the beginning.
-fn last_magic(file: &mut File, end: u64) -> std::io::Result<Option<u64>> {
-    const BLOCK: u64 = 1 << 16;
-    let (mut end, mut block) = (end, Vec::new());
-    while end >= 2 * MAGIC.len() as u64 {
-        let start = end.saturating_sub(BLOCK);
-        file.seek(SeekFrom::Start(start))?;
-        block.clear();
-        file.take(end - start).read_to_end(&mut block)?;
-        if let Some(at) = block.windows(MAGIC.len()).rposition(|w| w == MAGIC) {
-            let found = start + (at + MAGIC.len()) as u64;
-            return Ok(Some(found).filter(|&e| e >= 2 * MAGIC.len() as u64));
-        }
-        // One that lies across the edge of two blocks is in the next one.
-        end = if start == 0 { 0 } else { start + MAGIC.len() as u64 - 1 };
-    }
-    Ok(None)
+    let groups_end = u64::from_le_bytes(*groups_end);
+    let put_back =
+        file.set_len(groups_end).and_then(|()| file.seek(SeekFrom::End(0))).and_then(|_| file.write_all(footer));
+    put_back.map_err(Error::io("write", path))?;
+    Ok(whole())
 }

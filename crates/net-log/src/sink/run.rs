@@ -9,7 +9,7 @@ use net_geometry::{Camera, Junction};
 
 use crate::error::{Error, Result};
 use crate::sink::annotated::AnnotatedMcap;
-use crate::sink::junctions::{JunctionsParquet, read_junctions, recover};
+use crate::sink::junctions::{JunctionsParquet, journal, read_junctions, recover};
 use crate::sink::poses::{PoseRow, PosesCsv};
 use crate::sink::poses_reader::PoseRows;
 use crate::sink::summary::replace;
@@ -141,11 +141,11 @@ impl RunFiles {
 fn junctions_kept(paths: &RunPaths, rows: &mut Vec<PoseRow>) -> Result<JunctionsParquet> {
     let (path, old) = (paths.junctions(), paths.dir.join("junctions.parquet.old"));
     // A resume that was itself stopped has left the old file, which has at least as much as the new one.
-    if !old.exists() && path.exists() {
+    if !old.exists() && recover(&path, &journal(&path))? {
         std::fs::rename(&path, &old).map_err(Error::io("write", &old))?;
     }
     let mut new = JunctionsParquet::create(&path)?;
-    let mut frames = if recover(&old)? { Some(read_junctions(&old)?) } else { None };
+    let mut frames = if old.exists() { Some(read_junctions(&old)?) } else { None };
     let mut next = || frames.as_mut().and_then(Iterator::next).transpose();
     let mut kept = 0;
     let mut found = next()?;

@@ -79,6 +79,8 @@ impl McapLog {
         };
         Ok(McapFrames {
             topic: Arc::from(topic.as_str()),
+            delay: None,
+            skip_before: 0,
             files: self.surveys.into_iter(),
             current: None,
             waiting: Vec::new(),
@@ -146,9 +148,17 @@ fn no_images(topics: &[TopicInfo]) -> String {
     format!("none of its topics holds images: {}", names.join(", "))
 }
 
+/// How far header times and times of logging may drift apart before a chunk that is passed over could hold a frame that is
+/// wanted, ns.
+const MOST_DRIFT: i64 = 60_000_000_000;
+
 /// The frames of one topic.
 pub(super) struct McapFrames {
     topic: Arc<str>,
+    /// Time of logging less time of exposure of the first frame, ns.
+    delay: Option<i64>,
+    /// Chunks that end before this time of logging are only counted, ns.
+    skip_before: u64,
     /// Files not begun.
     files: std::vec::IntoIter<Survey>,
     current: Option<OpenFile>,
@@ -188,7 +198,10 @@ impl Iterator for McapFrames {
             }
             let Some(mut file) = self.current.take() else {
                 match OpenFile::new(&self.files.next()?, &self.topic) {
-                    Ok(file) => self.current = Some(file),
+                    Ok(mut file) => {
+                        file.records.skip_before(self.skip_before);
+                        self.current = Some(file);
+                    }
                     Err(error) => self.damage.push(error.to_string()),
                 }
                 continue;
@@ -207,6 +220,9 @@ impl Iterator for McapFrames {
                     let Some(&kind) = channels.get(&channel) else { return };
                     let frame = frame(self.next_index, &self.topic, kind, log_time, data);
                     self.next_index += 1;
+                    if let (None, Some(exposed)) = (self.delay, frame.timestamp_ns) {
+                        self.delay = i64::try_from(log_time).ok().and_then(|logged| logged.checked_sub(exposed));
+                    }
                     if in_chunk && self.waiting_bytes + data.len() <= MAX_WAITING {
                         self.waiting_bytes += data.len();
                         self.waiting.push(frame);
@@ -215,6 +231,9 @@ impl Iterator for McapFrames {
                         self.ready.extend(self.waiting.drain(..));
                         self.ready.push_back(frame);
                     }
+                }
+                Event::Skipped { channel, messages } => {
+                    self.next_index += if channels.contains_key(&channel) { messages } else { 0 };
                 }
                 Event::ChunkEnd(sound) => {
                     for mut frame in self.waiting.drain(..) {
@@ -259,5 +278,14 @@ fn frame(index: u64, topic: &Arc<str>, kind: ImageType, log_time: u64, data: &[u
 impl Source for McapFrames {
     fn damage(&self) -> &[String] {
         &self.damage
+    }
+
+    fn skip_before(&mut self, timestamp_ns: i64) {
+        let Some(delay) = self.delay else { return };
+        let log_time = timestamp_ns.saturating_add(delay).saturating_sub(MOST_DRIFT);
+        self.skip_before = u64::try_from(log_time).unwrap_or(0);
+        if let Some(file) = &mut self.current {
+            file.records.skip_before(self.skip_before);
+        }
     }
 }

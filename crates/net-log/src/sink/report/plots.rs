@@ -16,6 +16,9 @@ const GREY: RGBColor = RGBColor(120, 130, 140);
 const RED: RGBColor = RGBColor(200, 50, 40);
 const GREEN: RGBColor = RGBColor(40, 150, 80);
 
+/// Typeface and size of the numbers at the axes, px.
+const LABEL: (&str, u32) = ("sans-serif", 12);
+
 /// What goes wrong in drawing: a formatting error, which memory does not give.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
@@ -149,7 +152,13 @@ fn over_time(series: &Series, curves: &[(&str, RGBColor, &[f64])], fixed: Option
             .x_label_area_size(28)
             .y_label_area_size(52)
             .build_cartesian_2d(t0..t1, y0..y1)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).bold_line_style(GREY.mix(0.2)).x_desc("s").draw()?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GREY.mix(0.2))
+            .x_desc("s")
+            .label_style(LABEL)
+            .draw()?;
         for (_, color, values) in curves {
             for run in series.curve(values) {
                 if let [(t, y)] = run[..] {
@@ -176,7 +185,14 @@ fn statuses(series: &Series) -> Result<String> {
             .x_label_area_size(28)
             .y_label_area_size(52)
             .build_cartesian_2d(0.0..count.max(1) as f64, 0.0..1.0)?;
-        chart.configure_mesh().disable_mesh().disable_y_axis().x_desc("frame").draw()?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .disable_y_axis()
+            .x_label_formatter(&|x| format!("{x:.0}"))
+            .x_desc("frame")
+            .label_style(LABEL)
+            .draw()?;
         let mut bands: Vec<(f64, f64, RowStatus)> = Vec::new();
         for column in 0..columns {
             let (a, b) = (column * count / columns, (column + 1) * count / columns);
@@ -216,7 +232,13 @@ fn histogram(values: &[f64]) -> Result<String> {
             .x_label_area_size(28)
             .y_label_area_size(52)
             .build_cartesian_2d(0.0..most, 0..top)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).bold_line_style(GREY.mix(0.2)).x_desc("ms").draw()?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GREY.mix(0.2))
+            .x_desc("ms")
+            .label_style(LABEL)
+            .draw()?;
         let edge = |i: usize| most * i as f64 / BARS as f64;
         let bars = counts.iter().enumerate().filter(|(_, n)| **n > 0);
         chart.draw_series(

@@ -29,6 +29,8 @@ pub(super) enum Event<'a> {
     Channel { id: u16, schema: u16, topic: String, encoding: String },
     /// A message; one in a chunk is to be trusted once the chunk has ended well.
     Message { channel: u16, log_time: u64, data: &'a [u8], in_chunk: bool },
+    /// A chunk was passed over with so many messages of a channel in it.
+    Skipped { channel: u16, messages: u64 },
     /// The chunk is over; its checksum was right, or why its messages can't be trusted.
     ChunkEnd(std::result::Result<(), String>),
 }
@@ -43,6 +45,8 @@ pub(super) struct Records {
     chunk: Option<Chunk>,
     /// Chunks by their first byte, from the summary: where to go on behind damage. Empty without a summary.
     places: BTreeMap<u64, Place>,
+    /// Chunks that end before this time of logging are only counted, ns.
+    skip_before: u64,
     /// What is wrong with the file.
     damage: Vec<String>,
     ended: bool,
@@ -71,7 +75,12 @@ impl Records {
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let position = magic.len() as u64;
-        Ok(Self { name, file, length, position, chunk: None, places, damage: Vec::new(), ended: false })
+        Ok(Self { name, file, length, position, chunk: None, places, skip_before: 0, damage: Vec::new(), ended: false })
+    }
+
+    /// Only counts the messages of chunks that end before this time of logging, ns, where an index tells how many they are.
+    pub(super) fn skip_before(&mut self, log_time: u64) {
+        self.skip_before = log_time;
     }
 
     /// What is wrong with the file, as far as it has been read.
@@ -141,6 +150,11 @@ impl Records {
         let cut_off = length > left;
         match opcode {
             op::CHUNK if self.places.get(&self.position).is_some_and(|p| p.skip) && !cut_off => self.skip(length)?,
+            op::CHUNK if !cut_off && self.count_messages(visit)? => {
+                // Reading the indexes has moved the file's position.
+                self.position += RECORD_HEADER + length;
+                self.file.seek(SeekFrom::Start(self.position))?;
+            }
             op::CHUNK => {
                 let options = LinearReaderOptions::default()
                     .with_skip_start_magic(true)
@@ -164,6 +178,32 @@ impl Records {
             _ => self.resume_behind(format!("no record at byte {}", self.position))?,
         }
         Ok(())
+    }
+
+    /// Counts the messages of the chunk at hand by its indexes, if it ends before what is wanted. `false`, with the file where it was,
+    /// if it must be read.
+    fn count_messages(&mut self, visit: &mut dyn FnMut(Event<'_>)) -> std::io::Result<bool> {
+        let Some(place) = self.places.get(&self.position).filter(|p| p.last_time < self.skip_before) else {
+            return Ok(false);
+        };
+        let mut counts = Vec::new();
+        for (&channel, &start) in &place.indexes {
+            self.file.seek(SeekFrom::Start(start))?;
+            // Opcode, length, channel, and the bytes that its entries of 16 bytes take.
+            let mut index = [0; 15];
+            let whole = self.file.read_exact(&mut index).is_ok();
+            let [opcode, _, _, _, _, _, _, _, _, id0, id1, b0, b1, b2, b3] = index;
+            if !whole || opcode != op::MESSAGE_INDEX || u16::from_le_bytes([id0, id1]) != channel {
+                self.file.seek(SeekFrom::Start(self.position + RECORD_HEADER))?;
+                return Ok(false);
+            }
+            counts.push((channel, u64::from(u32::from_le_bytes([b0, b1, b2, b3]) / 16)));
+        }
+        if counts.is_empty() {
+            return Ok(false);
+        }
+        counts.into_iter().for_each(|(channel, messages)| visit(Event::Skipped { channel, messages }));
+        Ok(true)
     }
 
     /// Passes over the body of a record.

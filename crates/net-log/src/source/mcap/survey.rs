@@ -17,8 +17,10 @@ const MAX_SUMMARY_RECORD: usize = 64 << 20;
 /// Where a chunk is.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
-    /// Channels that have messages in it; `None` where the index does not say.
-    channels: Option<BTreeSet<u16>>,
+    /// Where the index of each channel that has messages in it is, byte; empty if they are not indexed.
+    pub(super) indexes: BTreeMap<u16, u64>,
+    /// Time of logging of its last message, ns.
+    pub(super) last_time: u64,
     /// Whether it may be passed over.
     pub(super) skip: bool,
 }
@@ -76,7 +78,7 @@ impl Survey {
     fn places_with(&self, ids: &BTreeSet<u16>) -> BTreeMap<u64, Place> {
         let mut places = self.places.clone();
         for place in places.values_mut() {
-            place.skip = place.channels.as_ref().is_some_and(|c| c.is_disjoint(ids));
+            place.skip = !place.indexes.is_empty() && place.indexes.keys().all(|id| !ids.contains(id));
         }
         places
     }
@@ -87,8 +89,8 @@ impl Survey {
             (id, Channel { topic: channel.topic.clone(), schema, encoding: channel.message_encoding.clone() })
         });
         let places = summary.chunk_indexes.iter().map(|index| {
-            let ids: BTreeSet<u16> = index.message_index_offsets.keys().copied().collect();
-            (index.chunk_start_offset, Place { channels: (!ids.is_empty()).then_some(ids), skip: false })
+            let (indexes, last_time) = (index.message_index_offsets.clone(), index.message_end_time);
+            (index.chunk_start_offset, Place { indexes, last_time, skip: false })
         });
         let stats = summary.stats.as_ref();
         Self {
@@ -149,7 +151,7 @@ impl Survey {
                     cameras.insert(channel.topic.clone(), (kind, data.to_vec()));
                 }
             }
-            Event::ChunkEnd(_) => {}
+            Event::ChunkEnd(_) | Event::Skipped { .. } => {}
         }) {}
         Ok(Self { path: path.to_owned(), channels, counts: Some(counts), span, places: BTreeMap::new(), cameras })
     }
