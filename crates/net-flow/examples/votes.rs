@@ -19,9 +19,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stride = number(&args, "--stride", 1).unwrap_or(1).max(1) as u32;
     args.retain(|a| !a.starts_with("--") && a.parse::<i32>().is_err());
     println!(
-        "| scenario | decided right | ambiguous | blind | wrong | z of the best: median, 5 % | z of the second: median | ms a frame |"
+        "| scenario | decided right | ambiguous | blind | count broken | wrong in silence | z of the best: median, 5 % | z of the second: median | ms a frame |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for name in &args {
         let scenario = Scenario::by_name(name)?;
         let camera = scenario.camera()?;
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut simulator = Simulator::new(camera);
         let mut vote = CellVote::new(&VoteConfig::default())?;
         let mut image = Image::default();
-        let (mut right, mut ambiguous, mut blind, mut wrong) = (0, 0, 0, 0);
+        let (mut right, mut ambiguous, mut blind, mut broken, mut wrong) = (0, 0, 0, 0, 0);
         let (mut best, mut second) = (Vec::new(), Vec::new());
         // Cells between the caller's numbers and the true ones; what one frame adds to them.
         let mut off = (0, 0);
@@ -61,7 +61,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 Verdict::Decided => {
                     let (i, j) = result.correction().unwrap_or_default();
                     off = (off.0 + i, off.1 + j);
-                    if off == (0, 0) {
+                    if result.dropped > 0 {
+                        // It says itself that the count is broken.
+                        broken += 1;
+                        off = (0, 0);
+                        vote.reset();
+                    } else if off == (0, 0) {
                         right += 1;
                     } else {
                         wrong += 1;
@@ -81,7 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let at =
             |list: &[f64], q: f64| list.get((q * (list.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
         println!(
-            "| {name} | {right} | {ambiguous} | {blind} | {wrong} | {:.1}, {:.1} | {:.1} | {:.2} |",
+            "| {name} | {right} | {ambiguous} | {blind} | {broken} | {wrong} | {:.1}, {:.1} | {:.1} | {:.2} |",
             at(&best, 0.5),
             at(&best, 0.05),
             at(&second, 0.5),

@@ -35,7 +35,7 @@ fn run(name: &str, frames: std::ops::Range<u32>, per_frame: (i32, i32)) -> Vec<V
         if let Some((i, j)) = result.correction() {
             off = (off.0 + i, off.1 + j);
             drift = (drift.0 + result.shifts[0].cells.0, drift.1 + result.shifts[0].cells.1);
-            assert_eq!(off, (0, 0), "{name} {k}: {result:?}");
+            assert!(off == (0, 0) || result.dropped > 0, "{name} {k}: {result:?}");
         }
         results.push(result);
     }
@@ -80,4 +80,18 @@ fn nothing_to_see_is_blind() {
 fn bad_parameters_are_named() {
     let config = VoteConfig { min_z: f64::NAN, ..VoteConfig::default() };
     assert!(matches!(CellVote::new(&config), Err(net_flow::Error::Value { field: "min_z", .. })));
+}
+
+#[test]
+fn the_count_is_said_to_be_broken_when_doubt_outlasts_the_memory() {
+    let config = VoteConfig { memory_frames: 2, min_z: 100.0, ..VoteConfig::default() };
+    let mut vote = CellVote::new(&config).expect("valid");
+    let texture: Vec<u8> = (0..320u32 * 240).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    let lattice = |i: u32| u8::from(i % 320 % 20 < 2 || i / 320 % 20 < 2) * 150;
+    let picture: Vec<u8> = (0..320 * 240).map(|i| texture[i as usize] / 8 + lattice(i)).collect();
+    let view = GrayView::packed(&picture, 320, 240).expect("a view");
+    let square = |at: Vector2<f64>| Some(at * 20.0 + Vector2::new(160.5, 120.5));
+    let dropped: Vec<u32> = (0..5).map(|_| vote.update(view, (0, 0), square).dropped).collect();
+    // The first frame starts, two fit the memory, and no evidence reaches 100 deviations.
+    assert_eq!(dropped, [0, 0, 0, 1, 2]);
 }

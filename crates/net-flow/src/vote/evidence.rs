@@ -12,6 +12,8 @@ pub(super) struct Evidence {
     min_z: f64,
     min_ratio: f64,
     memory: usize,
+    /// Undecided frames that no longer fit the memory.
+    dropped: u32,
     /// Deviations of the undecided frames, oldest first, `shifts` numbers each.
     frames: Vec<f64>,
     shifts: usize,
@@ -25,6 +27,7 @@ impl Evidence {
             min_z: config.min_z,
             min_ratio: config.min_ratio,
             memory: config.memory_frames,
+            dropped: 0,
             frames: Vec::with_capacity(shifts * (config.memory_frames + 1)),
             shifts,
         }
@@ -32,6 +35,7 @@ impl Evidence {
 
     pub(super) fn clear(&mut self) {
         self.frames.clear();
+        self.dropped = 0;
     }
 
     /// Adds a frame's deviations and judges all that are undecided.
@@ -39,6 +43,7 @@ impl Evidence {
         if self.frames.len() == self.memory * self.shifts {
             // The oldest stays undecided for good.
             self.frames.drain(..self.shifts);
+            self.dropped = self.dropped.saturating_add(1);
         }
         self.frames.extend(z.iter().map(|z| z.unwrap_or(UNSEEN)));
         let count = self.frames.len() / self.shifts;
@@ -59,6 +64,7 @@ impl Evidence {
         VoteResult {
             verdict: if decided { Verdict::Decided } else { Verdict::Ambiguous },
             frames: count as u32,
+            dropped: self.dropped,
             shifts: best,
             log_odds: (first.max(0.0).powi(2) - second.max(0.0).powi(2)) / 2.0,
             compared,

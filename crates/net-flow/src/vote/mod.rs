@@ -32,13 +32,13 @@ pub struct VoteConfig {
     pub min_z: f64,
     /// And so many times as far as the second, 1 to 10. Default 1.5.
     pub min_ratio: f64,
-    /// Undecided frames whose evidence is added up, 1 to 32. Default 8.
+    /// Undecided frames whose evidence is added up, 1 to 32. Default 16: more than a fish takes to pass.
     pub memory_frames: usize,
 }
 
 impl Default for VoteConfig {
     fn default() -> Self {
-        Self { half_columns: 9, half_rows: 6, reach_cells: 4, min_z: 5.0, min_ratio: 1.5, memory_frames: 8 }
+        Self { half_columns: 9, half_rows: 6, reach_cells: 4, min_z: 5.0, min_ratio: 1.5, memory_frames: 16 }
     }
 }
 
@@ -90,6 +90,9 @@ pub struct VoteResult {
     /// Frames in a row whose evidence is in this verdict, this one included. When decided for a shift k with m frames: each of them was off by k more than the
     /// one before, so this one's coordinates are to be moved by m k, the one before's by (m - 1) k, and so on.
     pub frames: u32,
+    /// Undecided frames before those, too old for the memory. Unless it is zero the count of cells is broken: how this frame's numbers go on from those
+    /// before the doubt is not known, whatever the verdict, and the caller has to say so.
+    pub dropped: u32,
     /// The likeliest shifts *per frame*, best first.
     pub shifts: [ShiftScore; LISTED],
     /// Natural logarithm of the odds of the best shift to the second.
@@ -100,10 +103,10 @@ pub struct VoteResult {
 
 impl VoteResult {
     fn without_scores(verdict: Verdict) -> Self {
-        Self { verdict, frames: 0, shifts: [ShiftScore::default(); LISTED], log_odds: 0.0, compared: 0 }
+        Self { verdict, frames: 0, dropped: 0, shifts: [ShiftScore::default(); LISTED], log_odds: 0.0, compared: 0 }
     }
 
-    /// Cells by which this frame's coordinates are to be moved; `None` while undecided.
+    /// Cells by which this frame's coordinates are to be moved; `None` while undecided. See also [`VoteResult::dropped`].
     pub fn correction(&self) -> Option<(i32, i32)> {
         let m = i32::try_from(self.frames).unwrap_or(i32::MAX);
         let (i, j) = self.shifts[0].cells;
