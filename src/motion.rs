@@ -15,14 +15,14 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// The pose expected at `timestamp_ns`; `None` without a recent pose.
+    /// The pose expected at `timestamp_ns`; `None` without a velocity from two recent poses.
     pub fn predict(&self, timestamp_ns: i64) -> Option<Pose> {
         let (then, pose) = self.last?;
         let dt = seconds(then, timestamp_ns);
         if dt > LONGEST_GAP_S {
             return None;
         }
-        let Some((turn, speed)) = self.velocity else { return Some(pose) };
+        let (turn, speed) = self.velocity?;
         let rotation = Rotation3::new(turn * dt) * pose.rotation;
         let centre = pose.camera_in_net() + speed * dt;
         Some(Pose { rotation, translation: -(rotation * centre) })
@@ -63,6 +63,7 @@ mod tests {
         let mut motion = Motion::default();
         assert!(motion.predict(0).is_none());
         motion.observe(0, &pose(0.0));
+        assert!(motion.predict(100_000_000).is_none(), "one pose has no velocity");
         motion.observe(100_000_000, &pose(0.1));
         let predicted = motion.predict(300_000_000).expect("two poses were seen");
         assert!((predicted.matrix() - pose(0.3).matrix()).amax() < ROUNDING);

@@ -1,7 +1,8 @@
 //! The precise way: one lattice on one sheet over the whole picture, followed from frame to frame.
 
+use net_flow::{FlowTracker, Hints, Motion as FlowMotion, Status};
 use net_geometry::nalgebra::Vector2;
-use net_geometry::{Camera, Junction, Mesh};
+use net_geometry::{Camera, Junction, Mesh, Pose};
 use net_image::GrayView;
 use net_junction::{AdjustConfig, LatticeMap, NetAdjuster};
 use net_lattice::{LatticeEstimate, LatticeEstimator};
@@ -18,20 +19,38 @@ pub(crate) struct LatticeMethod {
     threshold: f64,
     motion: Motion,
     track: Track,
+    flow: FlowTracker,
+    /// The last frame's answer, if it was vouched for.
+    last: Option<LatticeEstimate>,
     adjuster: NetAdjuster,
 }
 
 /// Distance, cells, between predicted and found lattice above which a count is not carried over a gap.
 const COUNTED_ON_CELLS: f64 = 0.3;
 
+/// Farthest, cells, that a followed lattice may lie from where it was predicted.
+const FOLLOWED_CELLS: f64 = 0.2;
+/// Farthest, as cosine, that its normal may have turned from the predicted one: 2 degrees.
+const FOLLOWED_COSINE: f64 = 0.99939;
+
+/// Whether a followed answer is what was predicted, nearly. One that is not may have locked half a cell aside at the rim: look anew.
+fn is_near(followed: &LatticeEstimate, predicted: &Pose) -> bool {
+    let same_names = |named: &LatticeEstimate| (named.pose.translation - followed.pose.translation).norm() < 1e-9;
+    followed.pose.normal().dot(&predicted.normal()) > FOLLOWED_COSINE
+        && followed.counted_on(predicted).is_some_and(|(named, off)| off < FOLLOWED_CELLS && same_names(&named))
+}
+
 impl LatticeMethod {
     pub fn new(camera: &Camera, mesh: &Mesh, config: &net_lattice::Config) -> Result<Self> {
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
         Ok(Self {
             estimator: LatticeEstimator::new(camera, mesh, config)?,
             threshold: config.probability_threshold,
             motion: Motion::default(),
             track: Track::default(),
-            adjuster: NetAdjuster::new(camera.width() as usize, camera.height() as usize, &AdjustConfig::default())?,
+            flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
+            last: None,
+            adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
         })
     }
 
@@ -42,27 +61,65 @@ impl LatticeMethod {
         timestamp_ns: i64,
         junctions: &mut Vec<Junction>,
     ) -> Result<Option<Found>> {
+        let step = self.flow.update(image, &Hints::default())?.step;
+        let (flow_status, flow_motion) = (step.status, step.motion);
+        // A steady motion says where the lattice is to a fraction of a cell, which is what following takes.
         let predicted = self.motion.predict(timestamp_ns);
-        let mut found = match &predicted {
-            Some(pose) => self.estimator.update(image, pose)?.filter(|e| e.probability >= self.threshold),
-            None => None,
-        };
+        let mut found = None;
+        if let Some(pose) = &predicted {
+            let followed = self.estimator.update(image, pose)?;
+            found = followed.filter(|e| e.probability >= self.threshold && is_near(e, pose));
+        }
         if found.is_none() {
             found = self.estimator.estimate(image)?;
             if let Some(estimate) = found.as_mut().filter(|e| e.probability >= self.threshold) {
-                match predicted.and_then(|pose| estimate.counted_on(&pose)).filter(|(_, off)| *off < COUNTED_ON_CELLS) {
-                    Some((counted, _)) => *estimate = counted,
+                let carried = match predicted {
+                    Some(pose) => Some((pose, true)),
+                    None => self.last.as_ref().zip(flow_motion).and_then(|(last, motion)| {
+                        Some((self.pose_after(last, &motion)?, flow_status == Status::Tracked))
+                    }),
+                };
+                let counted = carried.and_then(|(pose, sure)| {
+                    let (named, off) = estimate.counted_on(&pose)?;
+                    Some((named, sure && off < COUNTED_ON_CELLS))
+                });
+                match counted {
+                    Some((named, sure)) => {
+                        *estimate = named;
+                        // The likeliest count goes on, under a new number: it may be off by whole cells.
+                        if !sure {
+                            self.track.start();
+                        }
+                    }
                     None => self.track.start(),
                 }
             }
         }
-        let Some(estimate) = found else { return Ok(None) };
+        let Some(estimate) = found else {
+            self.last = None;
+            return Ok(None);
+        };
+        let answer = Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() };
         if estimate.probability >= self.threshold {
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
             self.list_junctions(image, &estimate, junctions)?;
+            self.last = Some(estimate);
+        } else {
+            self.last = None;
         }
-        Ok(Some(Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() }))
+        Ok(Some(answer))
+    }
+
+    /// The last pose, moved along the net as the picture moved about the optical axis.
+    fn pose_after(&self, last: &LatticeEstimate, motion: &FlowMotion) -> Option<Pose> {
+        let camera = self.estimator.camera();
+        let axis = Vector2::new(camera.cx(), camera.cy());
+        let before = last.lattice_from_pixel(camera, motion.inverse()?.apply(axis))?;
+        let moved = before - last.lattice_from_pixel(camera, axis)?;
+        let (sin, cos) = last.crossing_angle.sin_cos();
+        let step = Vector2::new(moved.x * last.sides[0] + moved.y * last.sides[1] * cos, moved.y * last.sides[1] * sin);
+        Some(Pose { translation: last.pose.translation - last.pose.rotation * step.push(0.0), ..last.pose })
     }
 
     /// The knots in view: predicted by the sheet, adjusted to the picture one by one.

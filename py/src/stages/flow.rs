@@ -65,8 +65,8 @@ impl FlowResult {
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         self.step.map(|m| matrix(py, 3, |r, c| m.matrix()[(r, c)])).transpose()
     }
-    #[getter]
-    fn from_key<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    #[getter(from_key)]
+    fn motion_from_key<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         self.from_key.map(|m| matrix(py, 3, |r, c| m.matrix()[(r, c)])).transpose()
     }
 }
