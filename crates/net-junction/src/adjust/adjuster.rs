@@ -8,7 +8,7 @@ use crate::adjust::graph::{Graph, predict};
 use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
 use crate::adjust::presence::{Presence, Twine, TwineState, template_half};
-use crate::adjust::profile::Profiles;
+use crate::adjust::profile::{Profiles, STEP_PX};
 use crate::adjust::solve::Solver;
 use crate::adjust::warp::{Warp, Warped, radii};
 use crate::error::{Error, Result};
@@ -140,7 +140,9 @@ impl NetAdjuster {
         self.heights.extend(graph.nodes.iter().map(|n| (n.scale * twine) as f32));
         let width = f64::from(crate::adjust::graph::median(&mut self.heights).unwrap_or(0.0));
         let half = template_half(height, width, config.point_spread_px);
-        presence.judge(graph, profiles, image, half, config);
+        // The brighter flank of shaded twine is its extreme.
+        let beside = ((0.6 * width + 0.5).max(1.0) / STEP_PX).round() as usize;
+        presence.judge(graph, profiles, image, half, beside, config);
         // 5. As far as names can be trusted.
         self.connector.walk(&self.graph, &self.presence.twines);
         self.report();

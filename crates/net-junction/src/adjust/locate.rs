@@ -135,10 +135,11 @@ impl Locator {
                 self.lines.push(sum / bins as f32);
             }
         }
-        // One fish must not outvote eighty twines.
+        // One rope or fish must not outvote eighty twines.
         self.scratch.clear();
-        self.scratch.extend(self.lines.iter().map(|a| a.abs()));
-        let limit = 3.0 * median(&mut self.scratch).unwrap_or(0.0) + 1e-6;
+        let strongest = |line: &[f32]| line.iter().fold(0.0_f32, |most, a| most.max(a.abs()));
+        self.scratch.extend(self.lines.chunks_exact(places).map(strongest));
+        let limit = 1.5 * median(&mut self.scratch).unwrap_or(0.0) + 1e-6;
         self.lines.iter_mut().for_each(|a| *a = a.clamp(-limit, limit));
     }
 

@@ -18,6 +18,8 @@ const MIDDLE: (f64, f64) = (0.12, 0.88);
 const SCATTER_MIN: (f32, f32) = (0.06, 0.07);
 /// A mesh whose level or spread is this many deviations off its surroundings' is covered by something.
 const HIDDEN: f32 = 4.0;
+/// Part of a template's extreme that it must reach on the line.
+const FLAT_TOP: f32 = 0.8;
 /// Structure beside a weak twine, in parts of the control lines', beyond which it is growth and no gap.
 const CLUTTER: f32 = 2.0;
 
@@ -58,6 +60,7 @@ pub(crate) struct Presence {
     means: Vec<f32>,
     valid: Vec<bool>,
     templates: Vec<f32>,
+    centred: Vec<bool>,
     amplitudes: Vec<f32>,
     row: Vec<f32>,
     twine: Lines,
@@ -83,12 +86,15 @@ struct Lines {
 
 impl Presence {
     /// Judges every twine.
+    ///
+    /// `half` is the template's length on each side, `beside` how far its extreme may lie off the line, both in steps.
     pub fn judge(
         &mut self,
         graph: &mut Graph,
         profiles: &mut Profiles,
         image: GrayView,
         half: usize,
+        beside: usize,
         config: &AdjustConfig,
     ) {
         profiles.sample(graph, half + SHIFT, false, 1);
@@ -103,6 +109,7 @@ impl Presence {
         let mut control = std::mem::take(&mut self.control);
         self.reduce(profiles, half, &mut control);
         (self.twine, self.control) = (twine, control);
+        self.centre(half, beside);
         self.find_covered(graph, image);
         self.decide(graph, config);
     }
@@ -198,6 +205,19 @@ impl Presence {
         }
     }
 
+    /// Learned templates fit whatever neighbours have in common, also twine beside the line: its extreme must lie on the line.
+    fn centre(&mut self, half: usize, beside: usize) {
+        self.centred.clear();
+        for template in self.templates.chunks_exact(2 * half + 1) {
+            let smooth = |k: usize| template[k - 1] + 2.0 * template[k] + template[k + 1];
+            let extreme =
+                (1..2 * half).map(smooth).fold(0.0_f32, |most, t| if t.abs() > most.abs() { t } else { most });
+            let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
+            // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
+            self.centred.push(near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme));
+        }
+    }
+
     /// How far each mesh's middle is off its surroundings, in their deviations; kept at the mesh's first edge of family 0.
     fn find_covered(&mut self, graph: &mut Graph, image: GrayView) {
         self.levels.clear();
@@ -263,7 +283,7 @@ impl Presence {
                 .map(|k| self.covered[k])
                 .fold(0.0, f32::max);
             let clutter = self.twine.structure[e] / (self.deviations[e] + 1e-6);
-            let told = !w.is_nan() && f64::from(contrast) > config.gate;
+            let told = !w.is_nan() && f64::from(contrast) > config.gate && self.centred[e];
             let state = match f64::from(llr) {
                 l if told && l > config.present_llr => TwineState::Present,
                 l if l > 0.0 && told && covered <= HIDDEN => TwineState::Unknown,

@@ -10,6 +10,8 @@ use crate::adjust::graph::{Graph, bend, median};
 
 /// Most weight of a bin; amplitudes five times their noise and more count alike.
 pub(crate) const WEIGHT_MAX: f32 = 25.0;
+/// Weight that the strongest answer in reach has where there is nothing but noise: three times the noise, squared.
+const WEIGHT_OF_NOISE: f32 = 9.0;
 /// Rounds of robust reweighting.
 const ROUNDS: usize = 5;
 /// Scale of residuals below which they are not believed, px.
@@ -77,9 +79,9 @@ impl Solver {
         }
     }
 
-    /// Sum of the bins' weights after the last reweighting: how much twine fits.
+    /// Sum of the bins' weights after the last reweighting, as far as they exceed what noise reaches: how much twine fits.
     pub fn weight(&self) -> f32 {
-        self.weights.iter().sum()
+        self.weights.iter().map(|w| (w - WEIGHT_OF_NOISE).max(0.0)).sum()
     }
 
     /// Displacement of a twine's ends across it.
