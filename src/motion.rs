@@ -1,7 +1,7 @@
 //! Constant velocity: where the net should be in the next frame.
 
 use net_geometry::Pose;
-use net_geometry::nalgebra::{Rotation3, Vector3};
+use net_geometry::nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 /// Longest gap between frames, s, over which a velocity is carried on.
 const LONGEST_GAP_S: f64 = 1.0;
@@ -33,7 +33,9 @@ impl Motion {
         self.velocity = self.last.and_then(|(then, last)| {
             let dt = seconds(then, timestamp_ns);
             (dt > 0.0 && dt <= LONGEST_GAP_S).then(|| {
-                let turn = (pose.rotation * last.rotation.inverse()).scaled_axis() / dt;
+                // By quaternion: the angle from a matrix's trace is not a number for the smallest turns.
+                let turn = UnitQuaternion::from_rotation_matrix(&(pose.rotation * last.rotation.inverse()));
+                let turn = turn.scaled_axis() / dt;
                 (turn, (pose.camera_in_net() - last.camera_in_net()) / dt)
             })
         });
@@ -68,5 +70,18 @@ mod tests {
         let predicted = motion.predict(300_000_000).expect("two poses were seen");
         assert!((predicted.matrix() - pose(0.3).matrix()).amax() < ROUNDING);
         assert!(motion.predict(2_000_000_000).is_none(), "too long ago");
+    }
+
+    #[test]
+    fn the_smallest_turns_are_numbers() {
+        for k in 0..2000 {
+            let rotation = Rotation3::from_euler_angles(0.1, 0.2, 0.3);
+            let turned = Rotation3::new(Vector3::new(1.0, -2.0, 0.5) * 1e-9 * f64::from(k)) * rotation;
+            let mut motion = Motion::default();
+            motion.observe(0, &Pose { rotation, translation: Vector3::z() });
+            motion.observe(1_000_000, &Pose { rotation: turned, translation: Vector3::z() });
+            let predicted = motion.predict(2_000_000).expect("two poses were seen");
+            assert!(predicted.matrix().iter().all(|x| x.is_finite()), "turn {k}e-9");
+        }
     }
 }

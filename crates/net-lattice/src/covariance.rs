@@ -1,6 +1,6 @@
 //! From the covariance of the sheet's parameters to that of the pose.
 
-use net_geometry::nalgebra::{Matrix6, Rotation3, SMatrix, Vector3};
+use net_geometry::nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use crate::estimate::Labels;
 use crate::fit::{Fitter, Observation, Robust};
@@ -65,8 +65,7 @@ pub(crate) fn pose(
         let mut d = [0.0; PARAMETERS];
         d[k] = step;
         let moved = labels.pose(&surface.stepped(&d));
-        let turn =
-            Rotation3::from_matrix_unchecked((moved.rotation * base.rotation.inverse()).into_inner()).scaled_axis();
+        let turn = UnitQuaternion::from_rotation_matrix(&(moved.rotation * base.rotation.inverse())).scaled_axis();
         let shift = moved.translation - base.translation;
         for i in 0..3 {
             j[(i, k)] = turn[i] / step;

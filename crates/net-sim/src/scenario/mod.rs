@@ -7,7 +7,7 @@ mod path;
 pub use camera::CameraModel;
 pub use path::Path;
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use net_geometry::{Camera, Mesh, Pose};
 use serde::{Deserialize, Serialize};
 
@@ -167,7 +167,12 @@ impl Scenario {
         let rate = 0.5 / step_s;
         Motion {
             linear_m_per_s: (moved.translation * rate).into(),
-            angular_deg_per_s: (moved.rotation.scaled_axis().map(f64::to_degrees) * rate).into(),
+            // By quaternion: the angle from a matrix's trace is not a number for the smallest turns.
+            angular_deg_per_s: (UnitQuaternion::from_rotation_matrix(&moved.rotation)
+                .scaled_axis()
+                .map(f64::to_degrees)
+                * rate)
+                .into(),
         }
     }
 }
