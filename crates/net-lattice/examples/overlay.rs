@@ -39,12 +39,28 @@ fn main() {
         let start = Instant::now();
         let found = estimator.estimate(view);
         let ms = start.elapsed().as_secs_f64() * 1e3;
+        let quickest = |estimator: &mut LatticeEstimator, predicted: Option<&net_geometry::Pose>| {
+            let once = |_| {
+                let start = Instant::now();
+                let done = match predicted {
+                    Some(pose) => estimator.update(view, pose),
+                    None => estimator.estimate(view),
+                };
+                done.map_or(f64::NAN, |_| start.elapsed().as_secs_f64() * 1e3)
+            };
+            (0..8).map(once).fold(f64::INFINITY, f64::min)
+        };
+        if let Ok(Some(e)) = &found {
+            let cold = quickest(&mut estimator, None);
+            let followed = quickest(&mut estimator, Some(&e.pose));
+            println!("quickest of 8: cold start {cold:.1} ms, followed {followed:.1} ms");
+        }
         let name = Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         match found {
             Ok(Some(e)) => {
                 let v = &e.evidence;
                 println!(
-                    "{name:44} p {:.2} range {:.3} m distance {:.3} tilt {:.1} crossing {:.1} (sd {:.2}) curvatures {:.2} {:.2} {:?} {:?} bend {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} sd {:.2} % {:.2} deg margin {:.2} {ms:.0} ms",
+                    "{name:44} p {:.2} range {:.3} m distance {:.3} tilt {:.1} crossing {:.1} (sd {:.2}) curvatures {:.2} {:.2} {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} sd {:.2} % {:.2} deg margin {:.2} {ms:.0} ms",
                     e.probability,
                     e.range,
                     e.pose.plane().distance,
@@ -56,6 +72,11 @@ fn main() {
                     e.model,
                     e.polarity,
                     v.bend.to_degrees(),
+                    v.separable,
+                    v.unlike,
+                    v.balance,
+                    v.cell_snr,
+                    v.dissent,
                     v.v[0],
                     v.v[1],
                     v.v2[0],

@@ -246,11 +246,16 @@ fn main() {
         if let Some(e) = &found {
             let v = &e.evidence;
             println!(
-                " | z {:.3} {:?} {:?} bend {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} n {}/{} margin {:.2} gain {:.4} near {:.2} ({}/{}) sd {:.2}% {:.2}deg",
+                " | z {:.3} {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} n {}/{} margin {:.2} gain {:.4} near {:.2} ({}/{}) sd {:.2}% {:.2}deg",
                 e.range,
                 e.model,
                 e.polarity,
                 v.bend.to_degrees(),
+                v.separable,
+                v.unlike,
+                v.balance,
+                v.cell_snr,
+                v.dissent,
                 v.v[0],
                 v.v[1],
                 v.v2[0],

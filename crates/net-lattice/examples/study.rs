@@ -123,10 +123,15 @@ fn main() {
         let d = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
         let n = e.covariance.try_inverse().map_or(f64::NAN, |c| (d.transpose() * c * d)[0] / 6.0);
         println!(
-            "{name} p {:.3} range {dr:8.4} % normal {dn:7.4} xy {:.3} mm nees {n:6.2} {:?} V {:.1} {:.1} V2 {:.1} {:.1} z {:.3}{}",
+            "{name} p {:.3} range {dr:8.4} % normal {dn:7.4} xy {:.3} mm nees {n:6.2} {:?} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} z {:.3}{}",
             e.probability,
             1e3 * Vector2::new(o.x - node.x, o.y - node.y).norm(),
             e.model,
+            e.evidence.separable,
+            e.evidence.unlike,
+            e.evidence.balance,
+            e.evidence.cell_snr,
+            e.evidence.dissent,
             e.evidence.v[0],
             e.evidence.v[1],
             e.evidence.v2[0],
@@ -222,8 +227,13 @@ fn negatives(count: u64, seed: u64) {
         let v = &e.evidence;
         let alarm = e.probability >= config.probability_threshold;
         println!(
-            "{k:4} {name:14} p {:.3} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {}/{} z {:.2} {:?} margin {:.2} gain {:.4}{}",
+            "{k:4} {name:14} p {:.3} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {}/{} z {:.2} {:?} margin {:.2} gain {:.4}{}",
             e.probability,
+            v.separable,
+            v.unlike,
+            v.balance,
+            v.cell_snr,
+            v.dissent,
             v.v[0],
             v.v[1],
             v.v2[0],

@@ -1,5 +1,6 @@
 //! Is it a net, and is the answer right? Statistics that a flexible fit cannot raise, and a probability from them.
 
+use crate::fold::Fold;
 use crate::lockin::{Measurement, Window};
 
 /// Coherence of the phases left over in the tiles.
@@ -17,6 +18,16 @@ pub struct Evidence {
     /// Angle, rad, between the tangent plane on the axis and the mean plane about it. Where a sheet bends by more than the tolerance
     /// inside the view, "the" normal means little.
     pub bend: f64,
+    /// Share of the average cell's variance that two families of straight twine can make: a sum of functions of one lattice coordinate each.
+    pub separable: f64,
+    /// Share of the variance of two by two average cells in which the four differ.
+    pub unlike: f64,
+    /// Variance of the average cell along the weaker family over that along the stronger.
+    pub balance: f64,
+    /// Variance of the average cell over that of noise: below about 1 the two above mean nothing.
+    pub cell_snr: f64,
+    /// Share of the tiles with strong waves whose phases contradict the lattice.
+    pub dissent: f64,
     /// Tiles about the optical axis that counted, of those there are.
     pub near: [usize; 2],
     /// Tiles that counted.
@@ -31,7 +42,13 @@ impl Evidence {
         let mut sum = [0.0; 2];
         let mut sum2 = [0.0; 2];
         let mut aligned = 0usize;
+        let (mut strong, mut against) = (0usize, 0usize);
         for m in measurements.iter().filter(|m| m.good) {
+            for f in 0..2 {
+                let loud = m.snr[f] > 12.0;
+                strong += usize::from(loud);
+                against += usize::from(loud && m.phase[f].abs() > 1.2);
+            }
             e.tiles += 1;
             aligned += usize::from(m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
             let second = m.k[0].max(m.k[1]) < 1.0 / 6.0;
@@ -47,6 +64,7 @@ impl Evidence {
             e.v = sum.map(|s| s * f64::sqrt(2.0 / e.tiles as f64));
             e.good = aligned as f64 / e.tiles as f64;
         }
+        e.dissent = against as f64 / strong.max(1) as f64;
         e.v2 = if e.tiles2 > 8 { sum2.map(|s| s * f64::sqrt(2.0 / e.tiles2 as f64)) } else { e.v };
         e
     }
@@ -67,6 +85,15 @@ impl Evidence {
         self
     }
 
+    /// Adds what the average cell looks like.
+    pub(crate) fn folded(mut self, fold: Fold) -> Self {
+        self.separable = fold.separable;
+        self.balance = fold.balance;
+        self.unlike = fold.unlike;
+        self.cell_snr = fold.snr;
+        self
+    }
+
     /// Adds the angle between tangent and mean plane.
     pub(crate) fn bent_by(mut self, angle: f64) -> Self {
         self.bend = angle;
@@ -76,13 +103,17 @@ impl Evidence {
     /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
     ///
     /// Two logistic rules, both of which must hold: coherence of fundamental and second harmonic over the picture; the same with the share
-    /// of agreeing tiles about the optical axis, where the claim is made. Then the chance that tangent and mean plane are the same thing.
+    /// of agreeing tiles about the optical axis, where the claim is made. Then the chances that the pattern is one of two families of twine,
+    /// that all its cells are alike, and that tangent and mean plane are the same thing.
     pub fn probability(&self) -> f64 {
-        let v = self.v[0].min(self.v[1]);
+        // A pattern that happens to repeat once in a while can be coherent in its fundamental alone: that counts up to a point.
+        let v = self.v[0].min(self.v[1]).min(6.0);
         let v2 = self.v2[0].abs().min(self.v2[1].abs());
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
-        let everywhere = logistic(-4.0 + 0.47 * v + 0.53 * v2);
+        let everywhere = logistic(-5.0 + 0.55 * v + 0.55 * v2);
         let here = logistic(-5.5 + 0.31 * v + 5.9 * self.good_near + 0.39 * v2);
-        everywhere.min(here) * logistic((3.5 - self.bend.to_degrees()) / 0.4)
+        let twine = logistic((self.separable - 0.82) / 0.02);
+        let alike = logistic((0.12 - self.unlike) / 0.015);
+        everywhere.min(here) * twine * alike * logistic((3.5 - self.bend.to_degrees()) / 0.4)
     }
 }

@@ -8,6 +8,7 @@ use crate::decision::Evidence;
 use crate::error::Result;
 use crate::estimate::{Followed, Labels, LatticeEstimate};
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
+use crate::fold;
 use crate::likelihood::{Drawing, Likelihood, Polarity};
 use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
@@ -540,6 +541,8 @@ impl Workspace {
         self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
         let evidence = Evidence::new(&self.tools.measurements).near(&self.tools.measurements, self.window(220.0));
         let mean_plane = self.mean_plane(&surface);
+        let t = &self.tools;
+        let evidence = evidence.folded(fold::fold(&self.view.levels[place.0], &t.map, t.high[place.0].1));
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {

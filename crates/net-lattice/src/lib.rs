@@ -11,7 +11,8 @@
 //! 6. `template`, `likelihood`: the twine drawn as it should look; how much better that explains the picture, and how each tile would move it.
 //!    Used to tell bright twine from dark, the true cell from rival periods, and for the last digits.
 //! 7. `model`: flat square, rhomb, quadratic to quartic sheet, by the Bayesian information criterion.
-//! 8. `decision`, `covariance`: a probability from statistics that the fit cannot raise, and errors that grow when the model does not fit.
+//! 8. `fold`: all cells on top of each other; the average cell must look like two crossing twines.
+//! 9. `decision`, `covariance`: a probability from statistics that the fit cannot raise, and errors that grow when the model does not fit.
 //!
 //! # Conventions
 //! Frames, pixels and units are those of [`net_geometry`]. Lattice coordinates are in cells. Of a bent net the pose is that of the tangent
@@ -44,6 +45,7 @@ mod error;
 mod estimate;
 mod estimator;
 mod fit;
+mod fold;
 mod likelihood;
 mod lockin;
 mod map;
