@@ -88,10 +88,10 @@ impl LatticeMethod {
                         *estimate = named;
                         // The likeliest count goes on, under a new number: it may be off by whole cells.
                         if !sure {
-                            self.track.start();
+                            self.restart();
                         }
                     }
-                    None => self.track.start(),
+                    None => self.restart(),
                 }
             }
         }
@@ -109,6 +109,12 @@ impl LatticeMethod {
             self.last = None;
         }
         Ok(Some(answer))
+    }
+
+    /// A new count. What was renamed has no velocity: the change of names would look like one.
+    fn restart(&mut self) {
+        self.track.start();
+        self.motion = Motion::default();
     }
 
     /// The last pose, moved along the net as the picture moved about the optical axis.
