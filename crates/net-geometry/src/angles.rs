@@ -2,8 +2,9 @@
 
 use nalgebra::Rotation3;
 
-/// ZYX angles, rad: `R = Rz(yaw) Ry(pitch) Rx(roll)` (thesis eq. 4.2, Fossen). Of a net's pose the axes are those of the camera
-/// frame, so roll tilts the net about the image's u axis, pitch about its v axis, and yaw turns it in the image.
+/// ZYX angles, rad: `R = Rz(yaw) Ry(pitch) Rx(roll)` (thesis eq. 4.2, Fossen). Of a net's pose the axes are those of
+/// the camera frame, so roll tilts the net about the image's u axis, pitch about its v axis, and yaw turns it in the
+/// image.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ZyxAngles {
     /// About z, rad, in (-pi, pi].

@@ -18,7 +18,8 @@ pub struct Basis {
 
 impl Basis {
     /// Lattice vectors are the rows of the inverse transpose of the matrix whose rows are the wave vectors, so that
-    /// `b_i · k_j = 1` for `i = j` and 0 otherwise. (Replaces the thesis's eq. 4.14, which swaps the sides of a foreshortened cell.)
+    /// `b_i · k_j = 1` for `i = j` and 0 otherwise. (Replaces the thesis's eq. 4.14, which swaps the sides of a
+    /// foreshortened cell.)
     ///
     /// # Errors
     /// [`Error::Degenerate`] for parallel or zero wave vectors.

@@ -149,8 +149,8 @@ impl Camera {
         Self { view_box, ..self }
     }
 
-    /// Ray `(x, y, 1)` in the camera frame through pixel `(u, v)`. `None` where the lens model has no inverse, or more than 89.9 degrees off
-    /// the axis.
+    /// Ray `(x, y, 1)` in the camera frame through pixel `(u, v)`. `None` where the lens model has no inverse, or more
+    /// than 89.9 degrees off the axis.
     #[inline]
     pub fn ray_from_pixel(&self, pixel: Vector2<f64>) -> Option<Vector3<f64>> {
         let distorted = self.plane_from_pixel(pixel);
@@ -193,7 +193,8 @@ impl Camera {
         Some((self.pixel_from_plane(distorted), scale * distortion * projection))
     }
 
-    /// Where the lens puts what the pinhole of the same intrinsics would see at `pixel`: what an undistorted picture is read from.
+    /// Where the lens puts what the pinhole of the same intrinsics would see at `pixel`: what an undistorted picture is
+    /// read from.
     pub fn pixel_from_pinhole(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
         self.pixel_from_point(self.plane_from_pixel(pixel).push(1.0))
     }

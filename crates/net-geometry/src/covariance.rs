@@ -4,8 +4,8 @@ use nalgebra::{Matrix2x6, Matrix6, SMatrix, Vector3};
 
 use crate::pose::Pose;
 
-/// Covariance of a pose: of the rotation vector, rad, then the shift, m, of [`Pose::perturbed`] (both in the camera frame) that leads from the
-/// estimate to the truth.
+/// Covariance of a pose: of the rotation vector, rad, then the shift, m, of [`Pose::perturbed`] (both in the camera
+/// frame) that leads from the estimate to the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseCovariance {
     /// The 6 x 6 matrix, rad², rad m, m².
@@ -19,8 +19,8 @@ fn row(turn: Vector3<f64>, shift: Vector3<f64>) -> Row {
 }
 
 impl PoseCovariance {
-    /// The covariance after the net's origin has moved by `step`, m, in the camera frame (from one node to another): what turns about the old origin
-    /// shifts the new one, `shift' = shift + turn x step`.
+    /// The covariance after the net's origin has moved by `step`, m, in the camera frame (from one node to another):
+    /// what turns about the old origin shifts the new one, `shift' = shift + turn x step`.
     pub fn with_origin_moved(&self, step: Vector3<f64>) -> Self {
         let mut transport = Matrix6::identity();
         transport.fixed_view_mut::<3, 3>(3, 0).copy_from(&-step.cross_matrix());

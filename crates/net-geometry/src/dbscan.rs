@@ -4,7 +4,8 @@ use nalgebra::Vector2;
 
 use crate::nearest::NearestPoints;
 
-/// DBSCAN on points of the plane, with its buffers kept between calls: it allocates nothing once it has met as many points.
+/// DBSCAN on points of the plane, with its buffers kept between calls: it allocates nothing once it has met as many
+/// points.
 #[derive(Debug, Clone, Default)]
 pub struct Dbscan {
     neighbours: NearestPoints,
@@ -13,13 +14,13 @@ pub struct Dbscan {
 }
 
 impl Dbscan {
-    /// Cluster label of each point into `labels` (cleared first): `None` is noise. Clusters are numbered in the order of their
-    /// first core point. Two points are neighbours when at most `radius(index of the first)` apart; a point counts itself.
-    /// Returns the number of clusters.
+    /// Cluster label of each point into `labels` (cleared first): `None` is noise. Clusters are numbered in the order
+    /// of their first core point. Two points are neighbours when at most `radius(index of the first)` apart; a point
+    /// counts itself. Returns the number of clusters.
     ///
-    /// A core point has at least `min_points` neighbours. With a radius of each point's own, its circle decides whom it takes along: a
-    /// point with a large circle may take one with a small circle that would not take it. Points that are not finite, and points whose
-    /// radius is negative or NaN, take nobody along; the former are always noise.
+    /// A core point has at least `min_points` neighbours. With a radius of each point's own, its circle decides whom it
+    /// takes along: a point with a large circle may take one with a small circle that would not take it. Points that
+    /// are not finite, and points whose radius is negative or NaN, take nobody along; the former are always noise.
     pub fn cluster(
         &mut self,
         points: &[Vector2<f64>],

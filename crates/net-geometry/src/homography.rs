@@ -13,8 +13,8 @@ pub struct Homography {
     matrix: Matrix3<f64>,
 }
 
-/// Ratio of eigenvalues (squared lengths) below which normalised points count as lying on a line. Rounding leaves about 1e-16, a sliver of
-/// 1 : 1000 has 1e-6.
+/// Ratio of eigenvalues (squared lengths) below which normalised points count as lying on a line. Rounding leaves about
+/// 1e-16, a sliver of 1 : 1000 has 1e-6.
 const DEGENERATE: f64 = 1e-12;
 
 fn degenerate(why: &'static str) -> Error {
@@ -46,20 +46,21 @@ impl Homography {
         Self::from_pairs(from.iter().copied().zip(to.iter().copied()))
     }
 
-    /// The homography that takes the first of each pair to the second, by the direct linear transform on normalised coordinates
-    /// (Hartley 1997), in the reduced form of Harker and O'Leary 2005: exact for four points, algebraic least squares for more.
-    /// Reads the pairs several times and allocates nothing.
+    /// The homography that takes the first of each pair to the second, by the direct linear transform on normalised
+    /// coordinates (Hartley 1997), in the reduced form of Harker and O'Leary 2005: exact for four points, algebraic
+    /// least squares for more. Reads the pairs several times and allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Degenerate`] for fewer than four pairs, points that are not finite, or that lie (but for one) on a line.
+    /// [`Error::Degenerate`] for fewer than four pairs, points that are not finite, or that lie (but for one) on a
+    /// line.
     pub fn from_pairs(pairs: impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> + Clone) -> Result<Self> {
         let source = Normalisation::of(pairs.clone().map(|p| p.0))?;
         let target = Normalisation::of(pairs.clone().map(|p| p.1))?;
         let n = pairs.clone().count() as f64;
         let pairs = || pairs.clone().map(|(p, q)| (source.apply(p), target.apply(q)));
 
-        // Rows of h: (a, b, c), (d, e, f), g. With centred points c and f follow from g and the means; a, b, d, e follow from g by
-        // least squares on the points. What is left is a 2n x 3 system for g, always well scaled.
+        // Rows of h: (a, b, c), (d, e, f), g. With centred points c and f follow from g and the means; a, b, d, e
+        // follow from g by least squares on the points. What is left is a 2n x 3 system for g, always well scaled.
         let mut spread = Matrix2::zeros();
         let (mut mean_u, mut mean_v) = (Vector2::zeros(), Vector2::zeros());
         for (x, y) in pairs() {
@@ -103,8 +104,8 @@ impl Homography {
         Self::from_matrix(target.inverse_matrix() * h * source.matrix())
     }
 
-    /// Plane to picture: pixel of the point `(X, Y)` m of the net's plane, for the pinhole of `camera`. The lens is not in it: no
-    /// homography describes a lens.
+    /// Plane to picture: pixel of the point `(X, Y)` m of the net's plane, for the pinhole of `camera`. The lens is not
+    /// in it: no homography describes a lens.
     ///
     /// # Errors
     /// [`Error::Degenerate`] if the plane passes through the camera.

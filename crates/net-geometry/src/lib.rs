@@ -4,23 +4,30 @@
 //! Every crate, the command line, Python and the files agree on these.
 //!
 //! - **Camera frame**: x right, y down, z forward (OpenCV and ROS optical frame).
-//! - **Pixels** `(u, v)`: u right, v down; the centre of the top-left pixel is `(0, 0)`, so the image reaches from -0.5 to its width
-//!   less 0.5. A pixel is one of the image as it was read, lens distortion included.
+//! - **Pixels** `(u, v)`: u right, v down; the centre of the top-left pixel is `(0, 0)`, so the image reaches from -0.5
+//!   to its width less 0.5. A pixel is one of the image as it was read, lens distortion included.
 //! - **Rays** are `(x, y, 1)` in the camera frame: points of the plane `z = 1`.
-//! - **Net frame**: the net is the plane `Z = 0` (of a bent net: its tangent plane at the optical axis). X runs along the first
-//!   mesh direction, the one nearest to the image's u axis; Y completes the right-handed frame; Z points away from the camera.
-//! - **Pose** is net to camera: `X_cam = R * X_net + t`. Lattice node `(i, j)` lies at `i a1 + j a2` in the net plane, `a1` along X.
-//! - **Perturbations** and covariances of a pose are in the camera frame, rotation (rad) before translation (m): `exp(w) R`, `t + d`.
-//! - **Units**: metres, radians, nanoseconds since the Unix epoch. Degrees only in files and on screen, and then the name says so.
+//! - **Net frame**: the net is the plane `Z = 0` (of a bent net: its tangent plane at the optical axis). X runs along
+//!   the first mesh direction, the one nearest to the image's u axis; Y completes the right-handed frame; Z points away
+//!   from the camera.
+//! - **Pose** is net to camera: `X_cam = R * X_net + t`. Lattice node `(i, j)` lies at `i a1 + j a2` in the net plane,
+//!   `a1` along X.
+//! - **Perturbations** and covariances of a pose are in the camera frame, rotation (rad) before translation (m):
+//!   `exp(w) R`, `t + d`.
+//! - **Units**: metres, radians, nanoseconds since the Unix epoch. Degrees only in files and on screen, and then the
+//!   name says so.
 //! - **Names**: `camera_from_net` maps net coordinates to camera coordinates, so that `a_from_c = a_from_b * b_from_c`.
 //!
 //! # From pixels to a net
-//! 1. [`Camera`] with its [`Lens`] turns pixels into rays and points into pixels, with Jacobians. What a model cannot answer is
-//!    `None`: a wrong ray is worse than none.
+//! 1. [`Camera`] with its [`Lens`] turns pixels into rays and points into pixels, with Jacobians. What a model cannot
+//!    answer is `None`: a wrong ray is worse than none.
 //! 2. [`Basis`] turns wave vectors of a spectrum into lattice vectors in the picture.
-//! 3. [`planar_pnp`] finds both poses that the picture of a plane allows; [`Homography`] maps one picture of it to another.
-//! 4. [`Plane`] goes through points of several such poses, and [`Pose::from_plane`] turns it with a direction into a pose.
-//! 5. [`Lattice`], a [`Mesh`] in a pose, picks the origin and the axes of the net frame, lists the nodes in view and names junctions.
+//! 3. [`planar_pnp`] finds both poses that the picture of a plane allows; [`Homography`] maps one picture of it to
+//!    another.
+//! 4. [`Plane`] goes through points of several such poses, and [`Pose::from_plane`] turns it with a direction into a
+//!    pose.
+//! 5. [`Lattice`], a [`Mesh`] in a pose, picks the origin and the axes of the net frame, lists the nodes in view and
+//!    names junctions.
 //! 6. [`PoseCovariance`] says how sure range, tilt and place are.
 //!
 //! Beside it: [`Dbscan`] and [`NearestPoints`] for points of the picture, [`ZyxAngles`] for people.
@@ -69,6 +76,7 @@ mod nearest;
 mod plane;
 mod pnp;
 mod pose;
+mod region;
 
 pub use angles::ZyxAngles;
 pub use basis::{Basis, WaveVector};

@@ -90,10 +90,11 @@ impl Mesh {
         Vector2::new((point.x - j * a2.x) / self.side1, j)
     }
 
-    /// Indices of the node nearest to a point of the net plane, m: also for oblique meshes, where rounding the coordinates need not give it.
-    /// `None` for a point that is not finite, or more than 2^30 cells away.
+    /// Indices of the node nearest to a point of the net plane, m: also for oblique meshes, where rounding the
+    /// coordinates need not give it. `None` for a point that is not finite, or more than 2^30 cells away.
     pub fn nearest_node(&self, point: Vector2<f64>) -> Option<(i32, i32)> {
-        // In a basis of shortest vectors (Lagrange) the nearest node is a corner of the point's cell. Each with its own indices.
+        // In a basis of shortest vectors (Lagrange) the nearest node is a corner of the point's cell. Each with its own
+        // indices.
         let mut short = (self.a1(), Vector2::new(1.0, 0.0));
         let mut long = (self.a2(), Vector2::new(0.0, 1.0));
         loop {
@@ -101,8 +102,8 @@ impl Mesh {
                 std::mem::swap(&mut short, &mut long);
             }
             let overlap = short.0.dot(&long.0) / short.0.norm_squared();
-            // A little more than a half, or at exactly 60 degrees it would go to and fro. Each round shortens the longer vector, so this ends;
-            // meshes that are not slivers need one round at most.
+            // A little more than a half, or at exactly 60 degrees it would go to and fro. Each round shortens the
+            // longer vector, so this ends; meshes that are not slivers need one round at most.
             if !(overlap.abs() > 0.5 + 1e-9 && overlap.is_finite()) {
                 break;
             }
@@ -129,7 +130,8 @@ impl Mesh {
 }
 
 /// What a mesh may be written as.
-const MESH_TEXT: &str = "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, 50x50mm@60deg for an oblique mesh (sides up to 2 m, angle between 0 and 180 degrees)";
+const MESH_TEXT: &str = "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, \
+     50x50mm@60deg for an oblique mesh (sides up to 2 m, angle between 0 and 180 degrees)";
 
 /// Longest side taken from text, m: `50` is meant as millimetres, not as a net of 50 m meshes.
 const MAX_SIDE_IN_TEXT: f64 = 2.0;

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
-/// Points of the plane sorted into a grid of square cells, about two to a cell, so that neighbours are found without looking at all.
+/// Points of the plane sorted into a grid of square cells, about two to a cell, so that neighbours are found without
+/// looking at all.
 ///
-/// A k-d tree would do as well, but kiddo's can neither be refilled nor asked for all points within a radius without allocating; this
-/// keeps its buffers, and allocates nothing once it has held as many points. (The tests hold it against kiddo.) Points that are not
-/// finite are nobody's neighbours.
+/// A k-d tree would do as well, but kiddo's can neither be refilled nor asked for all points within a radius without
+/// allocating; this keeps its buffers, and allocates nothing once it has held as many points. (The tests hold it
+/// against kiddo.) Points that are not finite are nobody's neighbours.
 #[derive(Debug, Clone, Default)]
 pub struct NearestPoints {
     /// Top-left corner of the grid.

@@ -24,8 +24,8 @@ impl Plane {
     /// The plane `normal · P = distance`; the normal may be of any length and either sign.
     ///
     /// # Errors
-    /// [`Error::Degenerate`] for a normal of no length or not finite, or perpendicular to the optical axis: such a plane has no side that
-    /// faces the camera.
+    /// [`Error::Degenerate`] for a normal of no length or not finite, or perpendicular to the optical axis: such a
+    /// plane has no side that faces the camera.
     pub fn new(normal: Vector3<f64>, distance: f64) -> Result<Self> {
         let scale = normal.norm() * normal.z.signum();
         if !(scale.is_finite() && scale != 0.0 && distance.is_finite()) {
@@ -54,8 +54,9 @@ impl Plane {
         }
     }
 
-    /// The plane with the least sum of squared perpendicular distances from all points, m (thesis eq. 4.30 to 4.35, mended: the normal is the
-    /// *last right* singular vector of the *centred* points, and the distance follows from their mean). Allocates nothing.
+    /// The plane with the least sum of squared perpendicular distances from all points, m (thesis eq. 4.30 to 4.35,
+    /// mended: the normal is the *last right* singular vector of the *centred* points, and the distance follows from
+    /// their mean). Allocates nothing.
     ///
     /// # Errors
     /// As [`Plane::fit_weighted`].
@@ -66,8 +67,8 @@ impl Plane {
     /// As [`Plane::fit`], each point with a weight of its own (the inverse square of its sigma).
     ///
     /// # Errors
-    /// [`Error::Degenerate`] for fewer than three points, points on a line, numbers that are not finite, negative weights, or a plane
-    /// parallel to the optical axis.
+    /// [`Error::Degenerate`] for fewer than three points, points on a line, numbers that are not finite, negative
+    /// weights, or a plane parallel to the optical axis.
     pub fn fit_weighted(points: impl Iterator<Item = (Vector3<f64>, f64)> + Clone) -> Result<Self> {
         let (mut total, mut count) = (0.0, 0);
         let mut mean = Vector3::zeros();
@@ -123,15 +124,17 @@ impl Plane {
         self.depth_along(ray).map(|depth| ray * depth)
     }
 
-    /// How the point on the plane moves, m, while the ray `(x, y, 1)` moves by `step` (its z is zero): the step lifted to the plane
-    /// (eq. 4.27, mended: `B - z (n·B) / n_z` at the principal point, and its like elsewhere). `None` if the ray does not meet the plane.
+    /// How the point on the plane moves, m, while the ray `(x, y, 1)` moves by `step` (its z is zero): the step lifted
+    /// to the plane (eq. 4.27, mended: `B - z (n·B) / n_z` at the principal point, and its like elsewhere). `None` if
+    /// the ray does not meet the plane.
     #[inline]
     pub fn lift(&self, ray: Vector3<f64>, step: Vector3<f64>) -> Option<Vector3<f64>> {
         let depth = self.depth_along(ray)?;
         Some((step - ray * (self.normal.dot(&step) / self.normal.dot(&ray))) * depth)
     }
 
-    /// Depth on the optical axis, m (thesis eq. 4.25): the `range_m` of every file. `None` if the axis does not meet the plane.
+    /// Depth on the optical axis, m (thesis eq. 4.25): the `range_m` of every file. `None` if the axis does not meet
+    /// the plane.
     pub fn range(&self) -> Option<f64> {
         self.depth_along(Vector3::z())
     }

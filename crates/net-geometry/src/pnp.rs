@@ -1,4 +1,5 @@
-//! Pose of a plane from points on it (IPPE: Collins and Bartoli, "Infinitesimal plane-based pose estimation", IJCV 2014).
+//! Pose of a plane from points on it (IPPE: Collins and Bartoli, "Infinitesimal plane-based pose estimation", IJCV
+//! 2014).
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 
@@ -11,24 +12,24 @@ use crate::pose::Pose;
 pub struct PlanarPose {
     /// Plane to camera.
     pub pose: Pose,
-    /// Root mean square reprojection error on the plane `z = 1`; times the focal length it is pixels. Infinite for a pose that
-    /// puts a point behind the camera.
+    /// Root mean square reprojection error on the plane `z = 1`; times the focal length it is pixels. Infinite for a
+    /// pose that puts a point behind the camera.
     pub rms: f64,
 }
 
 /// Both poses of a plane from at least four of its points, better one first. Analytic, allocates nothing.
 ///
-/// `points_in_plane`: coordinates in the plane, m; they need not be centred. `rays`: `(x, y, 1)` of the same points in the camera
-/// frame (any positive z will do).
+/// `points_in_plane`: coordinates in the plane, m; they need not be centred. `rays`: `(x, y, 1)` of the same points in
+/// the camera frame (any positive z will do).
 ///
-/// The homography's value and Jacobian at the points' centroid leave two poses, mirror images of each other in the plane
-/// across the line of sight to the centroid. In a small or distant patch they reproject alike: look at both errors before
-/// believing the sign of the tilt. Facing the camera the two are one. Points given in mirrored order show the back of the plane: the
-/// pose's normal then points at the camera (negative z).
+/// The homography's value and Jacobian at the points' centroid leave two poses, whose normals are mirror images of each
+/// other in the line of sight to the centroid. In a small or distant patch they reproject alike: look at both errors
+/// before believing the sign of the tilt. Facing the camera the two are one. Points given in mirrored order show the back
+/// of the plane: the pose's normal then points at the camera (negative z).
 ///
 /// # Errors
-/// [`Error::Degenerate`] for fewer than four points, unequal lengths, numbers that are not finite, rays that do not point forward,
-/// points on a line, or points that no pose puts in front of the camera.
+/// [`Error::Degenerate`] for fewer than four points, unequal lengths, numbers that are not finite, rays that do not
+/// point forward, points on a line, or points that no pose puts in front of the camera.
 pub fn planar_pnp(points_in_plane: &[Vector2<f64>], rays: &[Vector3<f64>]) -> Result<[PlanarPose; 2]> {
     let degenerate = |why| Error::Degenerate { what: "planar pose", why };
     if points_in_plane.len() < 4 || points_in_plane.len() != rays.len() {
@@ -56,15 +57,17 @@ pub fn planar_pnp(points_in_plane: &[Vector2<f64>], rays: &[Vector3<f64>]) -> Re
     if poses[0].rms.is_finite() { Ok(poses) } else { Err(degenerate("no pose puts all points in front of the camera")) }
 }
 
-/// The two rotations whose plane, at the point seen at `centre` (on `z = 1`), has the homography's `jacobian` there up to scale.
+/// The two rotations whose plane, at the point seen at `centre` (on `z = 1`), has the homography's `jacobian` there up
+/// to scale.
 fn rotations(centre: Vector2<f64>, jacobian: Matrix2<f64>) -> Option<[Rotation3<f64>; 2]> {
-    // Turn the camera to look at the centre. The picture near it is then an orthographic one of the plane, scaled: the jacobian is
-    // B A with A the upper left 2 x 2 of the wanted rotation over the distance.
+    // Turn the camera to look at the centre. The picture near it is then an orthographic one of the plane, scaled: the
+    // jacobian is B A with A the upper left 2 x 2 of the wanted rotation over the distance.
     let camera_from_sight = Rotation3::rotation_between(&Vector3::z(), &centre.push(1.0))?;
     let sight = camera_from_sight.matrix();
     let b = sight.fixed_view::<2, 2>(0, 0) - centre * sight.fixed_view::<1, 2>(2, 0);
     let a = b.try_inverse()? * jacobian;
-    // A = Rot(left) diag(large, small) Rot(right), small with a sign: small / large is the cosine of the tilt against the line of sight.
+    // A = Rot(left) diag(large, small) Rot(right), small with a sign: small / large is the cosine of the tilt against
+    // the line of sight.
     let (e, f) = ((a[(0, 0)] + a[(1, 1)]) / 2.0, (a[(0, 0)] - a[(1, 1)]) / 2.0);
     let (g, h) = ((a[(1, 0)] + a[(0, 1)]) / 2.0, (a[(1, 0)] - a[(0, 1)]) / 2.0);
     let (sum, difference) = (e.hypot(h), f.hypot(g));
@@ -79,14 +82,15 @@ fn rotations(centre: Vector2<f64>, jacobian: Matrix2<f64>) -> Option<[Rotation3<
     })
 }
 
-/// The best translation for a rotation (linear least squares of errors times depth), and the reprojection error it leaves.
+/// The best translation for a rotation (linear least squares of errors times depth), and the reprojection error it
+/// leaves.
 fn with_rotation(
     rotation: Rotation3<f64>,
     centroid: Vector2<f64>,
     pairs: impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> + Clone,
 ) -> PlanarPose {
-    // With X = R (p - centroid) and t the centroid's place, image * (X.z + t.z) = X.xy + t.xy. The mean over the points gives t.xy from
-    // t.z, and what varies gives t.z.
+    // With X = R (p - centroid) and t the centroid's place, image * (X.z + t.z) = X.xy + t.xy. The mean over the points
+    // gives t.xy from t.z, and what varies gives t.z.
     let points = || pairs.clone().map(|(p, image)| (rotation * (p - centroid).push(0.0), image));
     let excess = |x: Vector3<f64>, image: Vector2<f64>| image * x.z - x.xy();
     let n = points().count() as f64;

@@ -15,10 +15,11 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose of a net in `plane`, its origin where the optical axis meets it, that has, at the principal point, a line of the net along
-    /// `direction` in the picture (thesis eq. 4.26 to 4.29, mended: the direction is lifted to the plane, and the axes are the *columns* of the
-    /// rotation). `direction` is on the plane `z = 1`: of a picture in pixels it is `(du / fx, dv / fy)`. `angle` is the
-    /// line's angle from the net's X axis, rad: 0 for the first lattice vector, the mesh's angle for the second.
+    /// The pose of a net in `plane`, its origin where the optical axis meets it, that has, at the principal point, a
+    /// line of the net along `direction` in the picture (thesis eq. 4.26 to 4.29, mended: the direction is lifted to
+    /// the plane, and the axes are the *columns* of the rotation). `direction` is on the plane `z = 1`: of a picture in
+    /// pixels it is `(du / fx, dv / fy)`. `angle` is the line's angle from the net's X axis, rad: 0 for the first
+    /// lattice vector, the mesh's angle for the second.
     ///
     /// # Errors
     /// [`Error::Degenerate`] if the optical axis does not meet the plane, or the direction has no length.
@@ -75,14 +76,15 @@ impl Pose {
         Plane { normal, distance: normal.dot(&self.translation) }
     }
 
-    /// Point `(X, Y)` of the net's plane, m, that the ray `(x, y, 1)` meets. `None` if it meets none in front of the camera.
+    /// Point `(X, Y)` of the net's plane, m, that the ray `(x, y, 1)` meets. `None` if it meets none in front of the
+    /// camera.
     #[inline]
     pub fn net_from_ray(&self, ray: Vector3<f64>) -> Option<Vector2<f64>> {
         self.plane().point_along(ray).map(|point| self.inverse_transform(point).xy())
     }
 
-    /// In-plane rotation, rad, in (-pi, pi]: the angle in the net's plane from the image's u axis, lifted to the plane where the optical axis
-    /// meets it, to the net's X axis. Positive turns X from u towards v.
+    /// In-plane rotation, rad, in (-pi, pi]: the angle in the net's plane from the image's u axis, lifted to the plane
+    /// where the optical axis meets it, to the net's X axis. Positive turns X from u towards v.
     pub fn in_plane_rotation(&self) -> f64 {
         let (n, x) = (self.normal(), self.x_axis());
         // u lifted to the plane, times n.z, which is positive.
@@ -90,8 +92,8 @@ impl Pose {
         n.dot(&u.cross(&x)).atan2(u.dot(&x))
     }
 
-    /// The pose with a small motion added in the camera frame: `exp(turn) R`, `t + shift`. `turn` is a rotation vector, rad; `shift` is in m.
-    /// It turns about the net's origin, not the camera's.
+    /// The pose with a small motion added in the camera frame: `exp(turn) R`, `t + shift`. `turn` is a rotation vector,
+    /// rad; `shift` is in m. It turns about the net's origin, not the camera's.
     pub fn perturbed(&self, turn: Vector3<f64>, shift: Vector3<f64>) -> Self {
         Self { rotation: Rotation3::new(turn) * self.rotation, translation: self.translation + shift }
     }

@@ -7,7 +7,8 @@ use proptest::prelude::*;
 
 type Reference = (&'static str, &'static [f64], &'static [([f64; 2], [f64; 2])]);
 
-/// Model, coefficients, and points `(x, y)` on the plane `z = 1` with their pixels by OpenCV 4, for `fx, fy, cx, cy = 700, 710, 424, 240`:
+/// Model, coefficients, and points `(x, y)` on the plane `z = 1` with their pixels by OpenCV 4, for
+/// `fx, fy, cx, cy = 700, 710, 424, 240`:
 ///
 /// ```python
 /// project = cv2.fisheye.projectPoints if model == "equidistant" else cv2.projectPoints
@@ -164,8 +165,8 @@ proptest! {
 
 #[test]
 fn a_lens_is_refused_where_it_turns_back() {
-    // r - 0.35 r³ rises to 0.6506 at r = 0.9759 and falls from there: a pixel at 0.66 belongs to no ray, one at 0.6 to two, of which
-    // the inner one is meant.
+    // r - 0.35 r³ rises to 0.6506 at r = 0.9759 and falls from there: a pixel at 0.66 belongs to no ray, one at 0.6 to
+    // two, of which the inner one is meant.
     let camera = camera(Lens::PlumbBob([-0.35, 0.0, 0.0, 0.0, 0.0]));
     let at = |r: f64| Vector2::new(424.0 + 700.0 * r, 240.0);
     assert!(camera.ray_from_pixel(at(0.66)).is_none());

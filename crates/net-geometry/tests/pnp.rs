@@ -82,7 +82,8 @@ proptest! {
         let amplitude = 0.5 / 700.0;
         let rays: Vec<_> = rays(&truth, &points).into_iter().map(|r| r + Vector3::new(noise(), noise(), 0.0) * amplitude).collect();
         let [first, second] = planar_pnp(&points, &rays).unwrap();
-        // Uniform noise in (-a/2, a/2) has a root mean square of a/sqrt(6) over both axes; IPPE is not the least-squares optimum.
+        // Uniform noise in (-a/2, a/2) has a root mean square of a/sqrt(6) over both axes; IPPE is not the
+        // least-squares optimum.
         prop_assert!(first.rms < 2.0 * amplitude / 6f64.sqrt(), "rms {} of {amplitude}", first.rms);
         prop_assert!(angle(&first.pose.rotation, &truth.rotation) < 0.03);
         prop_assert!(second.rms > first.rms);
@@ -143,7 +144,8 @@ fn zero_tilt_on_the_axis_has_one_pose() {
 
 #[test]
 fn a_centred_parallelogram_is_tilted_not_flat() {
-    // The picture of a distant square tilted by 40 degrees is nearly a parallelogram: iterative solvers stay at zero tilt.
+    // The picture of a distant square tilted by 40 degrees is nearly a parallelogram: iterative solvers stay at zero
+    // tilt.
     let truth = pose(40f64.to_radians(), 1.0, 0.2, 4.0, 0.0, 0.0);
     let points = rectangle(0.02, 0.02, Vector2::zeros());
     let found = planar_pnp(&points, &rays(&truth, &points)).unwrap();
@@ -151,6 +153,21 @@ fn a_centred_parallelogram_is_tilted_not_flat() {
         assert!((p.pose.plane().tilt() - 40f64.to_radians()).abs() < 1e-2);
     }
     assert!(angle(&found[0].pose.rotation, &truth.rotation) < ROUNDING_OF_TILT);
+}
+
+#[test]
+fn a_perfect_parallelogram_has_two_tilts() {
+    // The affine picture of a square: no perspective tells the sign of the tilt, so neither pose is better.
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+    let points = corners.map(|(x, y)| Vector2::new(x, y) * 0.025);
+    let tilt = 40f64.to_radians();
+    let rays = corners.map(|(x, y)| Vector3::new(0.02 * x, 0.02 * y * tilt.cos(), 1.0));
+    let [first, second] = planar_pnp(&points, &rays).unwrap();
+    for found in [first, second] {
+        assert!((found.pose.plane().tilt() - tilt).abs() < ROUNDING, "{found:?}");
+    }
+    assert!((first.rms - second.rms).abs() < ROUNDING && first.rms > 1e-4);
+    assert!((first.pose.normal().y + second.pose.normal().y).abs() < ROUNDING);
 }
 
 #[test]

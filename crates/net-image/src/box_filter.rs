@@ -8,8 +8,9 @@ use crate::view::View;
 /// Largest radius, px: a column sum of `u16` then still fits its integer.
 const MAX_RADIUS: usize = 16_383;
 
-/// Mean over a square window, by running sums: the time it takes does not depend on the window. Exact for integers. Beyond its border the image
-/// goes on as its outermost pixel. Keeps its buffer: images of a size seen before allocate nothing.
+/// Mean over a square window, by running sums: the time it takes does not depend on the window. Exact for integers.
+/// Beyond its border the image goes on as its outermost pixel. Keeps its buffer: images of a size seen before allocate
+/// nothing.
 #[derive(Debug, Clone)]
 pub struct BoxFilter<T: Pixel> {
     radius: usize,

@@ -17,8 +17,8 @@ pub fn to_u8(image: View<'_, f32>, out: &mut Image<u8>) {
 
 /// 16-bit grey to 8-bit grey: `255 x / white`, rounded; what is brighter than `white` becomes 255.
 ///
-/// `white` is what the sensor gives for white: 65535 where 16 bits are used, 4095 for 12 bits in the lower part of 16. It is never taken
-/// from the picture, so brightness does not jump from frame to frame.
+/// `white` is what the sensor gives for white: 65535 where 16 bits are used, 4095 for 12 bits in the lower part of 16.
+/// It is never taken from the picture, so brightness does not jump from frame to frame.
 ///
 /// # Errors
 /// [`Error::Value`] for a `white` of zero.

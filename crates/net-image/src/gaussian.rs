@@ -11,8 +11,8 @@ const LANES: usize = 32;
 /// Largest standard deviation, px. Beyond it lies a mistake, not a blur.
 const MAX_SIGMA: f64 = 10_000.0;
 
-/// Separable Gaussian blur of any width. Beyond its border the image goes on as its outermost pixel. Keeps its buffers: images of a size
-/// seen before allocate nothing.
+/// Separable Gaussian blur of any width. Beyond its border the image goes on as its outermost pixel. Keeps its buffers:
+/// images of a size seen before allocate nothing.
 #[derive(Debug, Clone)]
 pub struct GaussianBlur {
     /// Weight of the centre and of its neighbours to one side; all of them, both sides, sum to one.
@@ -34,7 +34,8 @@ impl GaussianBlur {
         Self::with_radius(sigma, (4.0 * sigma + 0.5) as usize)
     }
 
-    /// A blur of standard deviation `sigma`, px, cut off `radius` px from its centre. The time it takes grows with the radius.
+    /// A blur of standard deviation `sigma`, px, cut off `radius` px from its centre. The time it takes grows with the
+    /// radius.
     ///
     /// # Errors
     /// [`Error::Value`] if `sigma` is not a number from 0 to 10,000, or the radius above 40,000.

@@ -30,8 +30,8 @@ impl Gradient {
         Self { kernel, ..Self::default() }
     }
 
-    /// Derivatives of `image` along u into `du`, along v into `dv`; both take its size. Beyond its border the image goes on as its
-    /// outermost pixel.
+    /// Derivatives of `image` along u into `du`, along v into `dv`; both take its size. Beyond its border the image
+    /// goes on as its outermost pixel.
     pub fn apply<T: Pixel>(&mut self, image: View<'_, T>, du: &mut Image<f32>, dv: &mut Image<f32>) {
         let (width, height) = (image.width(), image.height());
         let (side, middle) = match self.kernel {

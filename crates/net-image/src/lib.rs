@@ -1,17 +1,18 @@
-//! Images as borrowed views, and what is done to them before geometry begins: filters, pyramids, sampling. Nothing here decodes a file.
+//! Images as borrowed views, and what is done to them before geometry begins: filters, pyramids, sampling. Nothing here
+//! decodes a file.
 //!
 //! # Conventions
-//! - **Pixels** `(u, v)`: u right, v down; the centre of the top-left pixel is `(0, 0)`. A pixel is a `u8`, `u16` or `f32` ([`Pixel`]);
-//!   grey values keep their scale, 0 black to 255 white, as `f32` too.
-//! - **Border**: filters see the image go on as its outermost pixel. Sampling between pixels ends at the centres of the outermost ones:
-//!   beyond is `None`.
-//! - **Buffers**: a filter is made once (`new(...)`), owns its scratch, and writes into an [`Image`] that the caller keeps. Both grow to
-//!   the size of the images they meet, and from then on nothing is allocated.
+//! - **Pixels** `(u, v)`: u right, v down; the centre of the top-left pixel is `(0, 0)`. A pixel is a `u8`, `u16` or
+//!   `f32` ([`Pixel`]); grey values keep their scale, 0 black to 255 white, as `f32` too.
+//! - **Border**: filters see the image go on as its outermost pixel. Sampling between pixels ends at the centres of the
+//!   outermost ones: beyond is `None`.
+//! - **Buffers**: a filter is made once (`new(...)`), owns its scratch, and writes into an [`Image`] that the caller
+//!   keeps. Both grow to the size of the images they meet, and from then on nothing is allocated.
 //!
 //! # Stages
-//! [`View`] and [`GrayView`] borrow, [`Image`] owns. [`convert`] changes the kind of pixel; [`GaussianBlur`] and [`BoxFilter`] smooth;
-//! [`Gradient`] differentiates; [`Pyramid`] halves; [`bilinear`] and [`bicubic`] read between pixels; [`Remap`] reads a whole picture
-//! that way.
+//! [`View`] and [`GrayView`] borrow, [`Image`] owns. [`convert`] changes the kind of pixel; [`GaussianBlur`] and
+//! [`BoxFilter`] smooth; [`Gradient`] differentiates; [`Pyramid`] halves; [`bilinear`] and [`bicubic`] read between
+//! pixels; [`Remap`] reads a whole picture that way.
 //!
 //! ```
 //! use net_image::{GaussianBlur, GrayView, Image, bilinear};

@@ -5,9 +5,9 @@ use crate::view::{GrayView, View};
 
 /// A grey image and its halves, quarters and so on. Keeps its buffers: images of a size seen before allocate nothing.
 ///
-/// Each level is the one below blurred with (1, 4, 6, 4, 1) / 16 along both axes (Burt and Adelson 1983), every other pixel kept:
-/// pixel `(u, v)` of level k is centred on pixel `(2^k u, 2^k v)` of the image, without an offset of halves. Beyond its border an image
-/// goes on as its outermost pixel.
+/// Each level is the one below blurred with (1, 4, 6, 4, 1) / 16 along both axes (Burt and Adelson 1983), every other
+/// pixel kept: pixel `(u, v)` of level k is centred on pixel `(2^k u, 2^k v)` of the image, without an offset of
+/// halves. Beyond its border an image goes on as its outermost pixel.
 #[derive(Debug, Clone)]
 pub struct Pyramid {
     /// Room for all levels; `used` of them are of this image.
@@ -24,7 +24,8 @@ impl Pyramid {
         Self { levels: vec![Image::default(); levels.clamp(1, 32)], used: 0, wide: Vec::new() }
     }
 
-    /// Takes a copy of `image` and builds the levels above. The last level is the last whose shorter side has at least `min_side` px.
+    /// Takes a copy of `image` and builds the levels above. The last level is the last whose shorter side has at least
+    /// `min_side` px.
     pub fn build(&mut self, image: GrayView<'_>, min_side: usize) {
         let mut size = (image.width(), image.height());
         self.levels[0].copy_from(image);

@@ -33,8 +33,8 @@ struct Entry {
 const OUTSIDE: u16 = u16::MAX;
 
 impl Remap {
-    /// A picture of `width` x `height` px whose pixel `(u, v)` is read at `source_from_pixel(u, v)` of a picture of `source_width` x
-    /// `source_height` px; `None` and places outside give black.
+    /// A picture of `width` x `height` px whose pixel `(u, v)` is read at `source_from_pixel(u, v)` of a picture of
+    /// `source_width` x `source_height` px; `None` and places outside give black.
     ///
     /// # Errors
     /// [`Error::Size`] for sizes of zero or above 65535 px.

@@ -14,8 +14,9 @@ pub fn bilinear<T: Pixel>(image: View<'_, T>, u: f64, v: f64) -> Option<f32> {
     Some(lerp(along(top), along(bottom), y))
 }
 
-/// The value at `(u, v)` px and its derivatives along u and v, by bicubic interpolation (Keys 1981, a = -1/2: exact for parabolas);
-/// `None` outside the centres of the outermost pixels (or for NaN). Beyond its border the image goes on as its outermost pixel.
+/// The value at `(u, v)` px and its derivatives along u and v, by bicubic interpolation (Keys 1981, a = -1/2: exact for
+/// parabolas); `None` outside the centres of the outermost pixels (or for NaN). Beyond its border the image goes on as
+/// its outermost pixel.
 #[inline]
 pub fn bicubic_with_gradient<T: Pixel>(image: View<'_, T>, u: f64, v: f64) -> Option<(f32, [f32; 2])> {
     let (width, height) = (image.width(), image.height());

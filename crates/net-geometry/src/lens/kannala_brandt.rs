@@ -1,5 +1,5 @@
-//! The fisheye model of Kannala and Brandt, as in OpenCV: the distance from the centre of the picture is a polynomial in the angle off the axis,
-//! `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)`, and `θ = atan r`.
+//! The fisheye model of Kannala and Brandt, as in OpenCV: the distance from the centre of the picture is a polynomial
+//! in the angle off the axis, `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)`, and `θ = atan r`.
 
 use nalgebra::{Matrix2, Vector2};
 

@@ -1,4 +1,5 @@
-//! How lenses bend the pinhole's rays. All models work on the plane `z = 1`: an undistorted point `(x, y)` goes to a distorted one.
+//! How lenses bend the pinhole's rays. All models work on the plane `z = 1`: an undistorted point `(x, y)` goes to a
+//! distorted one.
 
 mod kannala_brandt;
 mod plumb_bob;
@@ -10,8 +11,8 @@ use crate::error::{Error, Result, finite};
 
 /// How the lens bends the pinhole's rays. Coefficients in OpenCV's order.
 ///
-/// A model is used only as far out as it is one-to-one, and to 89.9 degrees off the axis at most: polynomials fitted to calibration images turn back
-/// somewhere beyond the picture's corners, and there a pixel would belong to two rays.
+/// A model is used only as far out as it is one-to-one, and to 89.9 degrees off the axis at most: polynomials fitted to
+/// calibration images turn back somewhere beyond the picture's corners, and there a pixel would belong to two rays.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Lens {
     /// Straight pinhole.
@@ -41,11 +42,12 @@ const QUICK_STEPS: usize = 8;
 const ARRIVED: f64 = 1e-12;
 
 impl Lens {
-    /// The lens of a ROS `camera_info`'s or a Kalibr camchain's distortion model and coefficients. Coefficients may be fewer, or more if
-    /// those that the model has no room for are zero; all zero is no lens.
+    /// The lens of a ROS `camera_info`'s or a Kalibr camchain's distortion model and coefficients. Coefficients may be
+    /// fewer, or more if those that the model has no room for are zero; all zero is no lens.
     ///
     /// # Errors
-    /// [`Error::LensModel`] for a model not known or too many coefficients, [`Error::Value`] for one that is not finite.
+    /// [`Error::LensModel`] for a model not known or too many coefficients, [`Error::Value`] for one that is not
+    /// finite.
     pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self> {
         let wrong = |expected| Error::LensModel { model: model.to_owned(), count: coefficients.len(), expected };
         for &k in coefficients {
@@ -133,7 +135,8 @@ fn filled<const N: usize>(given: &[f64]) -> [f64; N] {
     all
 }
 
-/// The first radius at which `stretch`, the least factor by which the lens stretches lengths there, is not above [`MIN_STRETCH`].
+/// The first radius at which `stretch`, the least factor by which the lens stretches lengths there, is not above
+/// [`MIN_STRETCH`].
 fn first_failure(stretch: impl Fn(f64) -> f64) -> f64 {
     let fails = |r: f64| {
         let least = stretch(r);
@@ -155,9 +158,9 @@ fn first_failure(stretch: impl Fn(f64) -> f64) -> f64 {
     good
 }
 
-/// The `x` in `[0, end]` where a function that increases there takes the value `target`: Newton's method inside a shrinking bracket, which
-/// is halved whenever Newton's step is not at most half of the step before. `None` if the function does not get that high.
-/// `value_and_slope` gives both at `x`.
+/// The `x` in `[0, end]` where a function that increases there takes the value `target`: Newton's method inside a
+/// shrinking bracket, which is halved whenever Newton's step is not at most half of the step before. `None` if the
+/// function does not get that high. `value_and_slope` gives both at `x`.
 fn solve_increasing(target: f64, end: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> Option<f64> {
     if !(target >= 0.0 && target <= value_and_slope(end).0) {
         return None;

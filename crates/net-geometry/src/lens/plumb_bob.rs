@@ -1,4 +1,5 @@
-//! Brown's model: a polynomial in the squared radius, and two tangential terms. The rational model with a denominator of one.
+//! Brown's model: a polynomial in the squared radius, and two tangential terms. The rational model with a denominator
+//! of one.
 
 /// The same lens as coefficients of the rational model.
 #[inline]

@@ -3,8 +3,8 @@
 //! `x_d = x g + 2 p1 x y + p2 (r² + 2 x²)`, `y_d = y g + p1 (r² + 2 y²) + 2 p2 x y`,
 //! `g = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶)`.
 //!
-//! With `p = (p2, p1)` the tangential part is `x_d = 2 (p·x) x + r² p`, its Jacobian `2 (p·x + p xᵀ + x pᵀ)`. All of the Jacobian is symmetric; where it is
-//! positive definite over a disc the map is one-to-one on it.
+//! With `p = (p2, p1)` the tangential part is `x_d = 2 (p·x) x + r² p`, its Jacobian `2 (p·x + p xᵀ + x pᵀ)`. All of
+//! the Jacobian is symmetric; where it is positive definite over a disc the map is one-to-one on it.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -23,8 +23,8 @@ fn radial(k: &[f64; 8], square: f64) -> (f64, f64) {
     (g, (d_above - g * d_below) / below)
 }
 
-/// Lower bound of the Jacobian's eigenvalues at radius `r`: `g` across, `g + 2 r² g'` along the radius, less what the tangential part can
-/// take away, `6 |p| r`.
+/// Lower bound of the Jacobian's eigenvalues at radius `r`: `g` across, `g + 2 r² g'` along the radius, less what the
+/// tangential part can take away, `6 |p| r`.
 pub(super) fn stretch(k: &[f64; 8], r: f64) -> f64 {
     let (g, slope) = radial(k, r * r);
     if g.is_nan() {
@@ -63,7 +63,8 @@ pub(super) fn undistort(k: &[f64; 8], distorted: Vector2<f64>, valid_radius: f64
     newton(k, distorted, distorted * (start / length), valid_radius, MAX_STEPS)
 }
 
-/// Newton's method from `point`. Where it arrives within the valid radius is the one point that goes to `distorted`, wherever it started.
+/// Newton's method from `point`. Where it arrives within the valid radius is the one point that goes to `distorted`,
+/// wherever it started.
 #[inline]
 fn newton(
     k: &[f64; 8],
