@@ -88,8 +88,8 @@ fn a_run_that_is_interrupted_leaves_whole_files() {
     use std::io::Read;
     let scratch = Scratch::new();
     // Too many frames to be done before the signal comes; each takes milliseconds.
-    let frames = 400;
-    scratch.image_log(frames, 256, 192);
+    let frames = 150;
+    scratch.image_log(frames, 96, 64);
     let mut child = netpose()
         .arg("run")
         .arg(scratch.path("log"))

@@ -4,6 +4,8 @@
 
 mod bad_input;
 mod folder;
+mod mcap;
 mod run;
+mod sim;
 mod support;
 mod usage;

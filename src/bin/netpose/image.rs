@@ -23,7 +23,7 @@ pub struct Args {
     /// One JSON document for each image, each on a line of its own, instead of the table
     #[arg(long)]
     json: bool,
-    /// Folder for a picture of each image: lattice, junctions, axes, status
+    /// Folder for two pictures of each image: the frame with lattice, junctions, axes and status, and its spectrum with peaks and wave vectors
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
 }
@@ -84,7 +84,8 @@ fn estimate(
             junctions: estimate.junctions,
             latency_ms,
         };
-        overlay.draw(view, &name, &shown).write_jpeg(&dir.join(&*name).with_extension("jpg"))?;
+        let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
+        overlay.write(view, &name, &shown, dir, &stem)?;
     }
     Ok(if as_json { json_line(path, &estimate, latency_ms) } else { row(path, &estimate, latency_ms) })
 }

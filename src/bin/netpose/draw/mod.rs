@@ -2,8 +2,12 @@
 
 mod canvas;
 mod net;
+mod spectrum;
 mod text;
 
+use std::path::Path;
+
+use anyhow::Result;
 use net_image::GrayView;
 use netpose::{Camera, Junction, Mesh, NetPose, Status};
 
@@ -47,6 +51,21 @@ impl Overlay {
         let colour = if shown.status == Status::Ok { GOOD } else { NO_NET };
         canvas.status(&status_lines(name, shown), colour);
         canvas
+    }
+
+    /// The frame's spectrum with its peaks, and the lattice's wave vectors where there is a pose.
+    pub fn spectrum(&self, gray: GrayView<'_>, shown: &Shown<'_>) -> Option<Canvas> {
+        let net = shown.net.map(|net| (net.pose, self.mesh_as_it_hangs(net)));
+        spectrum::draw_spectrum(gray, net.as_ref().map(|(pose, mesh)| (&self.camera, mesh, pose)))
+    }
+
+    /// Writes both pictures as JPEG: `stem.jpg` and `stem_spectrum.jpg`.
+    pub fn write(&self, gray: GrayView<'_>, name: &str, shown: &Shown<'_>, dir: &Path, stem: &str) -> Result<()> {
+        self.draw(gray, name, shown).write_jpeg(&dir.join(format!("{stem}.jpg")))?;
+        match self.spectrum(gray, shown) {
+            Some(spectrum) => spectrum.write_jpeg(&dir.join(format!("{stem}_spectrum.jpg"))),
+            None => Ok(()),
+        }
     }
 
     /// The mesh with the crossing angle that was estimated, if one was.

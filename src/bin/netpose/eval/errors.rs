@@ -56,9 +56,9 @@ fn inplane_error(estimate: &Pose, truth: &Pose, mesh: &Mesh) -> f64 {
 }
 
 /// The net looks the same after a turn and a shift by whole cells: the frame of the run is laid onto the truth's once, on the
-/// first pose, and must then stay.
+/// first pose of a count, and must then stay.
 #[derive(Debug, Clone, Copy)]
-pub struct Alignment {
+struct Alignment {
     /// Rotation from the run's net frame to the truth's.
     true_from_run: Rotation3<f64>,
     /// The run's origin in the truth's net frame, m.
@@ -85,6 +85,51 @@ impl Alignment {
     /// Estimated less true position of the camera in the truth's net frame, m.
     pub fn position_error(&self, estimate: &Pose, truth: &Pose) -> Vector3<f64> {
         self.true_from_run * estimate.camera_in_net() + self.shift - truth.camera_in_net()
+    }
+}
+
+/// Follows the error of the camera's place along the net through a run, count of cells by count of cells.
+#[derive(Debug)]
+pub struct Odometry {
+    mesh: Mesh,
+    /// Number of the count and how it lies on the truth.
+    aligned: Option<(u32, Alignment)>,
+    /// Error of the frame before, in the same count; `None` after a gap.
+    before: Option<Vector3<f64>>,
+    /// The place jumped by more than half a cell against the truth, and the run did not say so.
+    pub slips: usize,
+    /// The run said that it had lost the count and started another, with an origin of its own.
+    pub restarts: usize,
+}
+
+impl Odometry {
+    /// For a run on a net of this mesh.
+    pub fn new(mesh: Mesh) -> Self {
+        Self { mesh, aligned: None, before: None, slips: 0, restarts: 0 }
+    }
+
+    /// The next frame with both poses: the error in the truth's net frame, m, and whether a cell was slipped to it.
+    pub fn update(&mut self, track: u32, estimate: &Pose, truth: &Pose) -> (Vector3<f64>, bool) {
+        let align = match self.aligned {
+            Some((count, align)) if count == track => align,
+            earlier => {
+                self.restarts += usize::from(earlier.is_some());
+                self.before = None;
+                Alignment::new(estimate, truth, &self.mesh)
+            }
+        };
+        self.aligned = Some((track, align));
+        let error = align.position_error(estimate, truth);
+        let half_cell = 0.5 * self.mesh.side1().min(self.mesh.side2());
+        let slipped = self.before.is_some_and(|before| (error - before).xy().norm() > half_cell);
+        self.slips += usize::from(slipped);
+        self.before = Some(error);
+        (error, slipped)
+    }
+
+    /// A frame without a pose: a jump across it may be motion that nobody saw.
+    pub fn gap(&mut self) {
+        self.before = None;
     }
 }
 
@@ -118,6 +163,21 @@ mod tests {
         let mut slipped = named_otherwise(&later);
         slipped.translation = slipped.transform(Vector3::new(0.05, 0.0, 0.0));
         assert!((align.position_error(&slipped, &later).norm() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_slip_in_silence_is_told_from_a_count_started_anew() {
+        let mesh = Mesh::square(0.05).unwrap();
+        let truth = pose(0.1, 0.2, [0.0, 0.0, 1.2]);
+        let moved = |cells: f64| Pose { translation: truth.transform(Vector3::new(0.05 * cells, 0.0, 0.0)), ..truth };
+        let mut odometry = Odometry::new(mesh);
+        assert!(!odometry.update(0, &truth, &truth).1);
+        assert!(odometry.update(0, &moved(1.0), &truth).1);
+        // It stays a cell off: one slip, not one a frame.
+        assert!(!odometry.update(0, &moved(1.0), &truth).1);
+        assert!(!odometry.update(1, &moved(7.0), &truth).1);
+        assert!(odometry.update(1, &moved(7.0), &truth).0.norm() < 1e-12);
+        assert_eq!((odometry.slips, odometry.restarts), (1, 1));
     }
 
     #[test]

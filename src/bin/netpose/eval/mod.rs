@@ -7,12 +7,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use net_geometry::nalgebra::Vector3;
 use net_log::{RunPaths, RunSummary};
 use netpose::Mesh;
 use serde::Serialize;
 
-pub use errors::{Alignment, PoseError};
+pub use errors::{Odometry, PoseError};
 
 use crate::failure::Outcome;
 use crate::stats::{median, quantile};
@@ -115,9 +114,7 @@ fn compare(rows: &[table::Row], truths: &[table::Row], mesh: &Mesh, verbose: boo
     let mut report = Report::default();
     let (mut range, mut range_mm, mut normal, mut inplane, mut lateral, mut sigmas) =
         (vec![], vec![], vec![], vec![], vec![], vec![]);
-    let half_cell = 0.5 * mesh.side1().min(mesh.side2());
-    let mut alignment: Option<(Option<f64>, Alignment)> = None;
-    let mut last_error: Option<Vector3<f64>> = None;
+    let mut odometry = Odometry::new(*mesh);
     for row in rows {
         // The file's name where the truth knows it (a run may skip frames), else the frame's number.
         let Some(truth) = by_file.get(row.file.as_str()).or_else(|| by_frame.get(&row.frame)) else { continue };
@@ -132,26 +129,14 @@ fn compare(rows: &[table::Row], truths: &[table::Row], mesh: &Mesh, verbose: boo
             (claimed, net) => {
                 report.false_alarms += usize::from(claimed.is_some());
                 report.refused += usize::from(net.is_some());
-                last_error = None;
+                odometry.gap();
                 continue;
             }
         };
         let (Some(z), Some(true_z)) = (row.range(), truth.range()) else { continue };
         let error = PoseError::new(&pose, z, &true_pose, true_z, mesh);
-        let align = match alignment {
-            Some((track, align)) if track == row.track => align,
-            before => {
-                report.restarts += usize::from(before.is_some());
-                last_error = None;
-                Alignment::new(&pose, &true_pose, mesh)
-            }
-        };
-        alignment = Some((row.track, align));
-        let position = align.position_error(&pose, &true_pose);
-        let slipped = last_error.is_some_and(|last| (position - last).xy().norm() > half_cell);
-        last_error = Some(position);
+        let (position, slipped) = odometry.update(row.track.map_or(0, |track| track as u32), &pose, &true_pose);
         report.wrong += usize::from(error.is_wrong());
-        report.slips += usize::from(slipped);
         range.push(error.range_percent.abs());
         range_mm.push(1e3 * error.range_m.abs());
         normal.push(error.normal_deg);
@@ -179,6 +164,7 @@ fn compare(rows: &[table::Row], truths: &[table::Row], mesh: &Mesh, verbose: boo
         }
     }
     ensure!(report.frames > 0, "no frame of the run is in the truth: neither file names nor frame numbers agree");
+    (report.slips, report.restarts) = (odometry.slips, odometry.restarts);
     report.lateral_final_mm = lateral.last().copied();
     report.range_percent = Spread::of(&range);
     report.range_mm = Spread::of(&range_mm);

@@ -13,7 +13,7 @@ use super::Column;
 use super::published::TRACKING;
 use super::reading::{Picture, draw};
 use super::table::Table;
-use crate::eval::Alignment;
+use crate::eval::{Odometry, PoseError};
 use crate::stats::{median, quantile};
 
 /// Knots are tracked that stay this far inside the picture, px.
@@ -107,12 +107,19 @@ fn odometry_table(columns: &[Column], sequences: &[(&Scenario, &Vec<Picture>)]) 
     let mut head = vec![String::new()];
     for column in columns {
         let name = column.name;
-        head.extend([format!("{name}: answered"), "wrong".into(), "last frame".into(), "p95".into(), "slips".into()]);
+        head.extend([
+            format!("{name}: answered"),
+            "wrong".into(),
+            "last frame".into(),
+            "p95".into(),
+            "slips".into(),
+            "restarts".into(),
+        ]);
     }
     let mut table = Table::new(
         "Odometry along the net on the same frames",
         head,
-        "Error of the camera's place along the net, mm, after one alignment by whole cells on the first pose. Slip: it jumps by more than half a \
+        "Error of the camera's place along the net, mm, after one alignment by whole cells on the first pose of each count. Slip: it jumps by more than half a \
          cell.",
     );
     for (scenario, pictures) in sequences {
@@ -125,29 +132,21 @@ fn odometry_table(columns: &[Column], sequences: &[(&Scenario, &Vec<Picture>)]) 
     Ok(table)
 }
 
-fn odometry(column: &Column, scenario: &Scenario, pictures: &[Picture]) -> Result<[String; 5]> {
+fn odometry(column: &Column, scenario: &Scenario, pictures: &[Picture]) -> Result<[String; 6]> {
     let mesh = scenario.mesh()?;
     let mut tracker = Tracker::new(scenario.camera()?, mesh, &column.config)?;
-    let (mut errors_mm, mut last, mut alignment) = (Vec::new(), None, None::<Alignment>);
-    let (mut slips, mut wrong) = (0, 0);
+    let mut odometry = Odometry::new(mesh);
+    let (mut errors_mm, mut wrong) = (Vec::new(), 0);
     for picture in pictures {
         let estimate = tracker.update(view(picture)?, picture.timestamp_ns)?;
         let Some(net) = estimate.net else {
-            last = None;
+            odometry.gap();
             continue;
         };
         let truth = &picture.net;
         let range = truth.axis.map_or(f64::NAN, |axis| axis.range_m);
-        let error = crate::eval::PoseError::new(&net.pose, net.range_m, &truth.pose, range, &mesh);
-        wrong += usize::from(error.is_wrong());
-        let align = *alignment.get_or_insert_with(|| Alignment::new(&net.pose, &truth.pose, &mesh));
-        let position = align.position_error(&net.pose, &truth.pose);
-        let half_cell = 0.5 * mesh.side1().min(mesh.side2());
-        slips +=
-            usize::from(last.is_some_and(|before: net_geometry::nalgebra::Vector3<f64>| {
-                (position - before).xy().norm() > half_cell
-            }));
-        last = Some(position);
+        wrong += usize::from(PoseError::new(&net.pose, net.range_m, &truth.pose, range, &mesh).is_wrong());
+        let (position, _) = odometry.update(estimate.track, &net.pose, &truth.pose);
         errors_mm.push(1e3 * position.xy().norm());
     }
     let mm = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} mm"));
@@ -157,6 +156,7 @@ fn odometry(column: &Column, scenario: &Scenario, pictures: &[Picture]) -> Resul
         wrong.to_string(),
         mm(errors_mm.last().copied()),
         mm((answered > 0).then(|| quantile(&errors_mm, 0.95))),
-        slips.to_string(),
+        odometry.slips.to_string(),
+        odometry.restarts.to_string(),
     ])
 }

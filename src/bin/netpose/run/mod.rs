@@ -13,7 +13,7 @@ use anyhow::{Context, Result};
 use net_log::{LogInfo, LogSummary, OpenOptions, RunSummary, TimeBound};
 
 use crate::describe::{self, times};
-use crate::failure::Outcome;
+use crate::failure::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::options::Setup;
 use folder::{Existing, Folder};
@@ -46,7 +46,8 @@ pub struct Args {
     /// Threads that decode frames and draw overlays; results are the same for any number. Default: one for each core
     #[arg(long, value_name = "N")]
     jobs: Option<std::num::NonZeroUsize>,
-    /// Write a picture for each frame into DIR/overlay: lattice, junctions, axes, status
+    /// Write two pictures for each frame into DIR/overlay: the frame with lattice, junctions, axes and status, and its spectrum with peaks and wave
+    /// vectors
     #[arg(long)]
     overlay: bool,
     /// Go on where an earlier run into the same folder stopped
@@ -61,7 +62,7 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<Outcome> {
     let mesh = args.setup.mesh()?;
     let config = args.setup.config()?;
-    let log = net_log::open(&args.log, &args.open_options())?;
+    let log = net_log::open(&args.log, &args.open_options()).map_err(as_usage)?;
     let camera = args.setup.camera(log.info())?;
     eprintln!("{}", describe::log(log.info()));
     eprintln!("camera: {}", camera.origin);
@@ -78,6 +79,14 @@ pub fn main(args: &Args) -> Result<Outcome> {
     let finished = frames::process(log, &job, folder, &interrupt)?;
     println!("{}", finished.line());
     Ok(finished.outcome())
+}
+
+/// A topic that must be chosen, or is not there, is a matter of flags.
+fn as_usage(error: net_log::Error) -> anyhow::Error {
+    match error {
+        net_log::Error::SeveralTopics { .. } | net_log::Error::NoSuchTopic { .. } => Usage(error.to_string()).into(),
+        other => other.into(),
+    }
 }
 
 impl Args {

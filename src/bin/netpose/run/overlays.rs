@@ -33,12 +33,14 @@ impl<'a> Overlays<'a> {
         while self.under_way.len() >= self.depth {
             self.wait_for_one()?;
         }
-        let path = self.dir.join(format!("{frame:06}.jpg"));
+        let dir = self.dir.clone();
         let (done, promise) = sync_channel(1);
         let (overlay, tracked) = (Arc::clone(&self.overlay), tracked.clone());
         self.pool.spawn_fifo(move || {
             let drawn = match image.view() {
-                Some(view) => overlay.draw(view, &format!("frame {frame}"), &tracked.shown()).write_jpeg(&path),
+                Some(view) => {
+                    overlay.write(view, &format!("frame {frame}"), &tracked.shown(), &dir, &format!("{frame:06}"))
+                }
                 None => Ok(()),
             };
             // If nobody waits any more, nobody wants to know.

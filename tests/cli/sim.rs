@@ -1,0 +1,113 @@
+//! From a virtual net to a verdict: sim, run and eval together.
+
+use std::process::Output;
+
+use crate::support::{Scratch, assert_says, assert_status, netpose, stdout};
+
+fn sim(scratch: &Scratch, dir: &str, more: &[&str]) -> Output {
+    netpose()
+        .arg("sim")
+        .arg(scratch.path(dir))
+        .args(["--scenario", "strafe", "--frames", "3"])
+        .args(more)
+        .output()
+        .unwrap()
+}
+
+fn run(scratch: &Scratch, log: &str, out: &str, more: &[&str]) {
+    let output = netpose()
+        .arg("run")
+        .arg(scratch.path(log))
+        .args(["--cell", "50mm", "--out"])
+        .arg(scratch.path(out))
+        .args(more)
+        .output()
+        .unwrap();
+    assert_status(&output, 0);
+}
+
+/// Rows of `poses.csv` without some of their columns.
+fn poses_without(scratch: &Scratch, out: &str, columns: &[usize]) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(scratch.path(out).join("poses.csv")).unwrap();
+    let cells = |line: &str| -> Vec<String> {
+        line.split(',').enumerate().filter(|(k, _)| !columns.contains(k)).map(|(_, cell)| cell.to_owned()).collect()
+    };
+    text.lines().map(cells).collect()
+}
+
+const FILE: usize = 1;
+const LATENCY: usize = 21;
+
+#[test]
+fn a_virtual_net_is_found_where_it_is() {
+    let scratch = Scratch::new();
+    assert_status(&sim(&scratch, "log", &[]), 0);
+    run(&scratch, "log", "out", &["--jobs", "1"]);
+    let output = netpose()
+        .arg("eval")
+        .arg(scratch.path("out"))
+        .arg("--truth")
+        .arg(scratch.path("log/truth.csv"))
+        .arg("--json")
+        .output()
+        .unwrap();
+    assert_status(&output, 0);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).expect("nothing but JSON");
+    assert_eq!(
+        (report["frames"].as_u64(), report["ok"].as_u64(), report["wrong"].as_u64()),
+        (Some(3), Some(3), Some(0))
+    );
+    // Far looser than the estimator's own tests: what counts here is that units, frames and columns agree end to end.
+    assert!(report["range_percent"]["max"].as_f64().unwrap() < 1.0, "{report}");
+    assert!(report["normal_deg"]["max"].as_f64().unwrap() < 1.0, "{report}");
+    assert!(report["lateral_mm"]["max"].as_f64().unwrap() < 10.0, "{report}");
+
+    // The same for any number of threads, to the byte, but for the time it took (which annotated.mcap carries as well).
+    for jobs in ["2", "3"] {
+        run(&scratch, "log", "again", &["--jobs", jobs, "--overlay", "--force"]);
+        assert_eq!(poses_without(&scratch, "out", &[LATENCY]), poses_without(&scratch, "again", &[LATENCY]));
+        for name in ["junctions.parquet", "trajectory.tum"] {
+            let read = |out: &str| std::fs::read(scratch.path(out).join(name)).unwrap();
+            assert!(read("out") == read("again"), "{name} differs for --jobs {jobs}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_draws_the_same_log_and_mcap_holds_the_same_frames() {
+    let scratch = Scratch::new();
+    assert_status(&sim(&scratch, "a", &["--seed", "7"]), 0);
+    assert_status(&sim(&scratch, "b", &["--seed", "7"]), 0);
+    assert_status(&sim(&scratch, "c", &["--seed", "8"]), 0);
+    assert_status(&sim(&scratch, "m", &["--seed", "7", "--mcap"]), 0);
+    let read = |name: &str| std::fs::read(scratch.path(name)).unwrap();
+    for name in ["f000002.png", "truth.csv", "truth_junctions.csv", "timestamps.csv", "camera.yaml", "scenario.toml"] {
+        assert!(read(&format!("a/{name}")) == read(&format!("b/{name}")), "{name} differs");
+    }
+    assert!(read("a/f000002.png") != read("c/f000002.png"), "another seed, the same picture");
+    run(&scratch, "a", "out_a", &[]);
+    run(&scratch, "m/log.mcap", "out_m", &[]);
+    let poses = |out: &str| poses_without(&scratch, out, &[FILE, LATENCY]);
+    assert_eq!(poses("out_a"), poses("out_m"));
+}
+
+#[test]
+fn a_scenario_from_a_file_is_drawn_and_a_wrong_one_refused() {
+    let scratch = Scratch::new();
+    let file = scratch.write("mine.toml", "frames = 1\nmesh = \"30mm\"\n[camera]\nimage_width = 64\nimage_height = 48\ncx = 32.0\ncy = 24.0\nfx = 60.0\nfy = 60.0\n");
+    let draw = |dir: &str, scenario: &str| {
+        netpose().arg("sim").arg(scratch.path(dir)).args(["--scenario", scenario]).output().unwrap()
+    };
+    assert_status(&draw("mine", file.to_str().unwrap()), 0);
+    assert_eq!(image::image_dimensions(scratch.path("mine/f000000.png")).unwrap(), (64, 48));
+    let output = draw("mine", file.to_str().unwrap());
+    assert_status(&output, 1);
+    assert_says(&output, &["not empty"]);
+    let wrong = scratch.write("wrong.toml", "framess = 1\n");
+    let output = draw("wrong", wrong.to_str().unwrap());
+    assert_status(&output, 2);
+    assert_says(&output, &["framess"]);
+    let output = draw("none", "no-such-net");
+    assert_status(&output, 2);
+    assert_says(&output, &["no-such-net", "--list"]);
+}
