@@ -1,7 +1,7 @@
 //! What the picture shows, exactly.
 
-use nalgebra::{Vector2, Vector3};
-use net_geometry::{Mesh, Plane, Pose};
+use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
+use net_geometry::{Lattice, Mesh, Plane, Pose};
 
 /// The truth of one picture. Empty `layers`: no net.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,6 +30,22 @@ pub struct LayerTruth {
     /// How much brighter the twine is than what is behind it, in the middle of the picture and were it wide: grey levels, negative
     /// for a dark net.
     pub contrast_grey: f64,
+}
+
+impl LayerTruth {
+    /// The flat lattice that touches the net where the optical axis meets it: the tangent plane, X along the first mesh direction
+    /// there, the crossing angle there, and as its node `(0, 0)` the net's own, as if the net were spread flat on that plane.
+    /// [`Lattice::canonical`] turns it into the form that an estimator's first picture has. `None` if the axis passes the net by.
+    pub fn lattice_at_axis(&self) -> Option<Lattice> {
+        let axis = self.axis?;
+        let [x, second] = axis.directions;
+        let rotation =
+            Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, axis.normal.cross(&x), axis.normal]));
+        let mesh = Mesh::oblique(self.mesh.side1(), self.mesh.side2(), axis.crossing_angle).ok()?;
+        let to_node = x * (mesh.side1() * axis.cells.x) + second * (mesh.side2() * axis.cells.y);
+        let translation = Vector3::z() * axis.range_m - to_node;
+        Some(Lattice { pose: Pose { rotation, translation }, mesh })
+    }
 }
 
 /// The net where the optical axis meets it, jitter left out.

@@ -10,8 +10,8 @@ use crate::scene::Net;
 
 /// Knots nearer than this are not drawn, m: the twine would fill the view.
 const NEAR_M: f64 = 0.02;
-/// At most so many knots along a direction: a net seen edge-on would have no end of them.
-const MOST_KNOTS: i32 = 1600;
+/// Bent nets are laid out from their origin, and no farther from it than so many knots.
+const MOST_KNOTS: i32 = 1000;
 
 /// A knot.
 #[derive(Debug, Clone, Copy)]
@@ -81,12 +81,10 @@ impl Lattice {
     ) {
         let Some((mut columns, mut rows)) = region.bounds() else { return };
         let limit = |[low, high]: [i32; 2], ends: Option<[i32; 2]>| {
-            let [first, last] = ends.unwrap_or([i32::MIN / 4, i32::MAX / 4]);
-            let middle = (low + high) / 2;
-            let half = MOST_KNOTS / 2;
-            [low.max(first).max(middle - half), high.min(last).min(middle + half)]
+            let [first, last] = ends.unwrap_or([-MOST_KNOTS, MOST_KNOTS]);
+            [low.max(first).max(-MOST_KNOTS), high.min(last).min(MOST_KNOTS)]
         };
-        for _ in 0..6 {
+        for _ in 0..5 {
             columns = limit(columns, net.extent.columns());
             rows = limit(rows, net.extent.rows());
             if columns[0] > columns[1] || rows[0] > rows[1] {

@@ -13,6 +13,8 @@ const PROBE_PX: f64 = 16.0;
 pub(crate) struct Region {
     /// Corners, cells, in order.
     hull: Vec<Vector2<f64>>,
+    /// Where the optical axis meets the plane, cells.
+    foot: Vector2<f64>,
     scratch: Vec<Vector2<f64>>,
 }
 
@@ -22,6 +24,8 @@ impl Region {
         self.scratch.clear();
         let plane = pose.plane();
         let cells_from_net = Matrix2::from_columns(&[mesh.a1(), mesh.a2()]).try_inverse().unwrap_or_default();
+        let foot = plane.range().map(|range_m| pose.inverse_transform(Vector3::z() * range_m).xy());
+        self.foot = cells_from_net * foot.unwrap_or_default();
         let steps = |size: u32| ((f64::from(size) + 2.0 * MARGIN_PX) / PROBE_PX).ceil() as usize;
         for row in 0..=steps(camera.height()) {
             for column in 0..=steps(camera.width()) {
@@ -42,7 +46,7 @@ impl Region {
             let low = self.hull.iter().map(of).fold(f64::INFINITY, f64::min);
             let high = self.hull.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
             let more = 0.1 * (high - low) + 2.0;
-            clip((low - more).floor(), (high + more).ceil(), None).map(|(low, high)| [low, high])
+            clip((low - more).floor(), (high + more).ceil(), None, of(&self.foot)).map(|(low, high)| [low, high])
         };
         Some((ends(|p| p.x)?, ends(|p| p.y)?))
     }
@@ -51,7 +55,7 @@ impl Region {
     pub(crate) fn rows(&self, ends: Option<[i32; 2]>) -> Option<(i32, i32)> {
         let low = self.hull.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
         let high = self.hull.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        clip(low.floor(), high.ceil(), ends)
+        clip(low.floor(), high.ceil(), ends, self.foot.y)
     }
 
     /// First and last knot in view of row `j`, one more than the view at each end.
@@ -72,16 +76,24 @@ impl Region {
                 }
             }
         }
-        clip(low.floor() - 1.0, high.ceil() + 1.0, ends)
+        clip(low.floor() - 1.0, high.ceil() + 1.0, ends, self.foot.x)
     }
 }
 
-fn clip(low: f64, high: f64, limits: Option<[i32; 2]>) -> Option<(i32, i32)> {
+/// At most so many knots along a direction: of a net seen edge-on or from very far there would be no end.
+const MOST_KNOTS: i32 = 1000;
+
+/// Whole numbers from `low` to `high`, within `limits`, and no more than [`MOST_KNOTS`] around `middle`.
+fn clip(low: f64, high: f64, limits: Option<[i32; 2]>, middle: f64) -> Option<(i32, i32)> {
     if !(low.is_finite() && high.is_finite()) {
         return None;
     }
     let [first, last] = limits.unwrap_or([i32::MIN / 4, i32::MAX / 4]);
-    let (low, high) = ((low as i32).max(first), (high as i32).min(last));
+    // The casts saturate; a quarter of the whole range leaves room to add.
+    let end = i32::MAX / 4;
+    let (low, high) = ((low as i32).clamp(-end, end).max(first), (high as i32).clamp(-end, end).min(last));
+    let middle = (middle as i32).clamp(-end, end);
+    let (low, high) = (low.max(middle - MOST_KNOTS / 2), high.min(middle + MOST_KNOTS / 2));
     (low <= high).then_some((low, high))
 }
 

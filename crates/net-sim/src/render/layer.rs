@@ -1,21 +1,18 @@
 //! One net on the picture: twines of both directions as strokes, then knots and growth over them.
 
 use nalgebra::{Vector2, Vector3};
-use net_geometry::{Lens, Pose};
+use net_geometry::Pose;
 
-use super::profile::{DiscSpread, EdgeSpread, REACH_SIGMA};
-use super::stroke::{End, Family, Stroke, Vertex};
+use super::profile::{DiscSpread, EdgeSpread};
+use super::spot::Spot;
+use super::stroke::{End, Family, Stroke};
+use super::twine::{PIECE_PX, Pieces};
 use super::water::Medium;
 use crate::net::damage::{Damage, Edge};
 use crate::net::fabric::Fabric;
 use crate::net::lattice::{Lattice, Node};
 use crate::random::{Addressed, Stream};
 use crate::scene::Net;
-
-/// Longest piece of straight twine drawn in one, px: light and width are linear along it.
-const PIECE_PX: f64 = 32.0;
-/// Longest piece of curved twine: a parabola follows it to 0.001 px through any lens that keeps a picture together.
-const CURVED_PIECE_PX: f64 = 20.0;
 
 /// A net to be drawn, and where.
 #[derive(Clone, Copy)]
@@ -28,9 +25,6 @@ pub(crate) struct Subject<'a> {
     /// Distance at which the net is out of sight, m.
     pub(crate) far_m: f64,
 }
-
-/// Over the last quarter of the way to where they are out of sight twines fade, lest the net seem to end there.
-const FADE: f64 = 0.25;
 
 /// Draws nets onto pictures; owns what that takes.
 #[derive(Debug)]
@@ -222,11 +216,15 @@ impl LayerPainter {
                 let edge = Edge { i: index.0, j: index.1, family };
                 let [_, (i, j)] = edge.ends();
                 let Some(next) = subject.lattice.node(i, j) else { continue };
-                let at = (inverse * (node.point - subject.pose.translation)).xy() / growth.patch_m;
-                // A smooth field of mean 1 and as uneven as asked for.
-                let patch = (1.0 + growth.patchiness * 1.6 * place.fractal(at.x, at.y, 2)).max(0.0);
                 let (a, b, c) = edge.address(0);
-                if damage.broken(edge) || place.uniform(a, b, c) >= growth.density * patch {
+                let lot = place.uniform(a, b, c);
+                // A smooth field of mean 1, as uneven as asked for and never above 8: most pieces need not ask it.
+                if lot >= 8.0 * growth.density || damage.broken(edge) {
+                    continue;
+                }
+                let at = (inverse * (node.point - subject.pose.translation)).xy() / growth.patch_m;
+                let patch = (1.0 + growth.patchiness * 1.6 * place.fractal(at.x, at.y, 2)).clamp(0.0, 8.0);
+                if lot >= growth.density * patch {
                     continue;
                 }
                 let number = |k: i64, low: f64, high: f64| {
@@ -240,14 +238,15 @@ impl LayerPainter {
                     let off = Vector3::new(
                         number(10 + 4 * k, -spread, spread),
                         number(11 + 4 * k, -spread, spread),
-                        -spread.abs() * number(12 + 4 * k, 0.0, 1.0),
+                        -number(12 + 4 * k, 0.0, spread),
                     );
                     let radius = size * number(13 + 4 * k, 0.15, 0.38);
-                    self.blob(subject, centre + off, radius, growth.grey * (0.8 + 0.1 * k as f64), picture);
-                }
-                for (end, knot) in edge.ends().into_iter().zip([node, next]) {
-                    if (knot.point - centre).norm() < 0.5 * size {
-                        self.fouled.push(end);
+                    let grey = growth.grey * (0.8 + 0.1 * k as f64);
+                    let Some(spot) = self.blob(subject, centre + off, radius, grey, picture) else { continue };
+                    for (end, knot) in edge.ends().into_iter().zip([node, next]) {
+                        if (knot.pixel - spot.pixel).norm() < spot.radius_px {
+                            self.fouled.push(end);
+                        }
                     }
                 }
             }
@@ -256,146 +255,23 @@ impl LayerPainter {
         self.fouled.dedup();
     }
 
-    /// Draws a ball of this brightness.
-    fn blob(&self, subject: &Subject, point: Vector3<f64>, radius_m: f64, grey: f64, picture: &mut [f32]) {
+    /// Draws a ball of this brightness; where it is in the picture.
+    fn blob(
+        &self,
+        subject: &Subject,
+        point: Vector3<f64>,
+        radius_m: f64,
+        grey: f64,
+        picture: &mut [f32],
+    ) -> Option<Spot> {
         let camera = subject.medium.camera();
-        let Some(pixel) = camera.pixel_from_point(point).filter(|_| point.z > 0.02) else { return };
+        let pixel = camera.pixel_from_point(point).filter(|_| point.z > 0.02)?;
         let radius_px = radius_m * 0.5 * (camera.fx() + camera.fy()) / point.z;
         let place = subject.pose.inverse_transform(point).xy();
         let grey = subject.medium.seen(grey, point, pixel, place) as f32;
         let spot = Spot { pixel, radius_px, grey, strength: 1.0 };
         let sigma = subject.medium.scene().sensor.psf_px;
         spot.draw(&self.disc, &self.edge, sigma, camera.width() as usize, picture);
-    }
-}
-
-/// A disc on the picture.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Spot {
-    pub(crate) pixel: Vector2<f64>,
-    pub(crate) radius_px: f64,
-    pub(crate) grey: f32,
-    /// Share of what is behind it that it hides.
-    pub(crate) strength: f32,
-}
-
-impl Spot {
-    /// Draws it over what `picture` shows.
-    pub(crate) fn draw(&self, disc: &DiscSpread, edge: &EdgeSpread, sigma: f64, width: usize, picture: &mut [f32]) {
-        let height = picture.len() / width;
-        let reach = self.radius_px + REACH_SIGMA * sigma;
-        let span = |centre: f64, size: usize| {
-            let low = (centre - reach).ceil().max(0.0);
-            let high = (centre + reach).floor().min(size as f64 - 1.0);
-            (low <= high).then_some(low as usize..high as usize + 1)
-        };
-        let (Some(columns), Some(rows)) = (span(self.pixel.x, width), span(self.pixel.y, height)) else { return };
-        let radius = (self.radius_px / sigma) as f32;
-        for v in rows {
-            for u in columns.clone() {
-                let distance = (Vector2::new(u as f64, v as f64) - self.pixel).norm() / sigma;
-                let cover = self.strength * disc.coverage(distance as f32, radius, edge);
-                let out = &mut picture[v * width + u];
-                *out += cover * (self.grey - *out);
-            }
-        }
-    }
-}
-
-/// Cuts twine into strokes.
-struct Pieces<'a> {
-    subject: &'a Subject<'a>,
-    /// Whether straight lines stay straight, so that neighbouring meshes of a twine may be drawn in one.
-    straight: bool,
-    /// Whether a stroke needs its middle looked up.
-    curved: bool,
-    slack: [Addressed; 2],
-    brightness: Addressed,
-}
-
-impl<'a> Pieces<'a> {
-    fn of(subject: &'a Subject<'a>) -> Self {
-        let net = subject.net;
-        let bent_by_lens = *subject.medium.camera().lens() != Lens::None;
-        Self {
-            subject,
-            straight: net.is_straight() && !bent_by_lens,
-            curved: bent_by_lens || net.slack > 0.0,
-            slack: [Addressed::new(net.seed, Stream::SlackIn), Addressed::new(net.seed, Stream::SlackOut)],
-            brightness: Addressed::new(net.seed, Stream::TwineGrey),
-        }
-    }
-
-    /// Appends the strokes of the twine from one node to another, which is (or begins at) `edge`.
-    fn push(&self, edge: Edge, from: &Node, to: &Node, strokes: &mut Vec<Stroke>) {
-        let Subject { net, pose, medium, far_m, .. } = *self.subject;
-        let camera = medium.camera();
-        let chord = to.point - from.point;
-        let length_px = (to.pixel - from.pixel).norm();
-        let piece_px = if self.curved { CURVED_PIECE_PX } else { PIECE_PX };
-        // Far outside the picture a piece is not worth cutting.
-        let count = if length_px > 5000.0 { 1 } else { (length_px / piece_px).ceil().max(1.0) as usize };
-        let (a, b, c) = edge.address(0);
-        let bow = if net.slack > 0.0 {
-            let across = pose.normal().cross(&chord);
-            let [inward, outward] = self.slack.map(|s| net.slack * s.normal(a, b, c));
-            across * inward + pose.normal() * (chord.norm() * outward)
-        } else {
-            Vector3::zeros()
-        };
-        let brightness = if net.twine.variation > 0.0 {
-            (1.0 + net.twine.variation * self.brightness.normal(a, b, c)).clamp(0.2, 2.0)
-        } else {
-            1.0
-        };
-        let at = |t: f64| from.point + chord * t + bow * (4.0 * t * (1.0 - t));
-        let vertex = |t: f64, node: Option<&Node>| {
-            let point = node.map_or_else(|| at(t), |n| n.point);
-            let pixel = node.map_or_else(|| camera.pixel_from_point(point), |n| Some(n.pixel))?;
-            let direction = chord + bow * (4.0 - 8.0 * t);
-            let fade = ((1.0 - point.norm() / far_m) / FADE).clamp(0.0, 1.0);
-            let width_px = self.apparent_width(point, pixel, direction) * fade;
-            let place = pose.inverse_transform(point).xy();
-            let grey = medium.seen(net.twine.grey * brightness, point, pixel, place);
-            Some(Vertex { pixel, width_px, grey })
-        };
-        let Some(mut start) = vertex(0.0, Some(from)) else { return };
-        for k in 1..=count {
-            let t = k as f64 / count as f64;
-            let Some(end) = vertex(t, if k == count { Some(to) } else { None }) else { return };
-            let bow_px = if self.curved { self.bow(at(t - 0.5 / count as f64), start.pixel, end.pixel) } else { 0.0 };
-            let along = (end.pixel - start.pixel).try_normalize(1e-9).unwrap_or(Vector2::x());
-            let shade = net.twine.shading * Vector2::new(-along.y, along.x).dot(&medium.towards_light());
-            strokes.push(Stroke { from: start, to: end, bow_px, shade, start: End::Free, end: End::Free });
-            start = end;
-        }
-    }
-
-    /// How far the picture of `middle` lies off the chord, brought to the chord's middle by a parabola.
-    fn bow(&self, middle: Vector3<f64>, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
-        let bow = || {
-            let pixel = self.subject.medium.camera().pixel_from_point(middle)?;
-            let chord = to - from;
-            let along = chord.try_normalize(1e-9)?;
-            let t = (pixel - from).dot(&along) / chord.norm();
-            let bend = 4.0 * t * (1.0 - t);
-            (bend > 0.2).then(|| along.perp(&(pixel - from)) / bend)
-        };
-        bow().unwrap_or(0.0)
-    }
-
-    /// Width in the picture, px, of a cylinder through `point`: its outline is where the line of sight touches it, half a diameter
-    /// to either side of the axis, across both the twine and the line of sight.
-    fn apparent_width(&self, point: Vector3<f64>, pixel: Vector2<f64>, direction: Vector3<f64>) -> f64 {
-        let camera = self.subject.medium.camera();
-        let width = || {
-            let side = direction.cross(&point).try_normalize(1e-12)?;
-            let radius = 0.5 * self.subject.net.twine.diameter_m;
-            let edge = camera.pixel_from_point(point + side * radius)? - pixel;
-            let step = direction.try_normalize(1e-12)? * (1e-3 * point.z);
-            let ahead = (camera.pixel_from_point(point + step)? - pixel).try_normalize(1e-12)?;
-            Some(2.0 * ahead.perp(&edge).abs())
-        };
-        width().unwrap_or(0.0)
+        Some(spot)
     }
 }

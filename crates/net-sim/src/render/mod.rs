@@ -8,5 +8,7 @@ pub(crate) mod object;
 pub(crate) mod profile;
 pub(crate) mod sensor;
 pub(crate) mod snow;
+mod spot;
 pub(crate) mod stroke;
+mod twine;
 pub(crate) mod water;

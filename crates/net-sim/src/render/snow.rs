@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::layer::Spot;
 use super::profile::{DiscSpread, EdgeSpread};
+use super::spot::Spot;
 use super::water::Medium;
 use crate::random::{Addressed, Stream};
 

@@ -4,18 +4,9 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Vector2, Vector3};
 use net_geometry::{Camera, Lens, Mesh};
-use net_sim::{Extent, Image, Layer, Net, NetPose, Scene, Sensor, Simulator, Twine};
+use net_sim::{Extent, Image, Net, NetPose, Scene, Simulator, Twine};
 
-type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
-
-fn thesis_camera() -> Camera {
-    Camera::new(600.0, 600.0, 424.0, 240.0, 848, 480, Lens::None).expect("numbers are fine")
-}
-
-fn scene(mesh: &str, pose: NetPose) -> Result<Scene> {
-    let sensor = Sensor { read_noise_grey: 0.0, ..Sensor::default() };
-    Ok(Scene { layers: vec![Layer::planar(&mesh.parse::<Mesh>()?, pose)], sensor, ..Scene::default() })
-}
+use crate::support::{Result, camera, centre, quiet};
 
 /// Poses from the closest to the farthest, straight and oblique.
 fn poses() -> Vec<NetPose> {
@@ -35,17 +26,6 @@ fn poses() -> Vec<NetPose> {
     ]
 }
 
-/// Centre of brightness along the row through `p`, of what stands out from `background` within `half` px: u.
-fn centre_along_row(picture: &[f32], width: usize, p: Vector2<f64>, half: usize, background: f64) -> Option<f64> {
-    let (v, middle) = (p.y.round() as usize, p.x.round() as usize);
-    let row = &picture[v * width..][..width];
-    let first = middle.checked_sub(half)?;
-    let values = row.get(first..=middle + half)?;
-    let weights = values.iter().map(|&x| f64::from(x) - background);
-    let (sum, moment) = weights.enumerate().fold((0.0, 0.0), |(s, m), (k, w)| (s + w, m + w * (first + k) as f64));
-    (sum > 0.0).then_some(moment / sum)
-}
-
 #[test]
 fn twines_are_drawn_where_truth_says() -> Result {
     // A twine's centre of brightness must lie on the line between its knots. Mean over hundreds of places; anything systematic
@@ -54,10 +34,10 @@ fn twines_are_drawn_where_truth_says() -> Result {
     // One place: sampling a point spread of 0.6 px once a pixel leaves an alias of exp(-2 pi^2 0.36) = 8e-4 in the centroid, a real
     // camera's too; the width's change along the twine adds to it.
     const WORST_PX: f64 = 0.005;
-    let mut simulator = Simulator::new(thesis_camera());
+    let mut simulator = Simulator::new(camera());
     let mut image = Image::default();
     for (pose, mesh) in poses().into_iter().zip(["50mm", "50mm", "50mm", "150mm"]) {
-        let scene = scene(mesh, pose)?;
+        let scene = quiet(mesh, pose);
         let truth = simulator.render(&scene, 1, &mut image)?.clone();
         let nodes: HashMap<_, _> = truth.layers[0].nodes.iter().map(|n| (n.index, n.pixel)).collect();
         let mut errors = Vec::new();
@@ -82,7 +62,7 @@ fn twines_are_drawn_where_truth_says() -> Result {
                 if !clear {
                     continue;
                 }
-                if let Some(u) = centre_along_row(simulator.noiseless(), 848, p, half as usize, 90.0) {
+                if let Some(u) = centre(simulator.noiseless(), 848, p, half as usize, false, 90.0) {
                     errors.push(u - p.x);
                 }
             }
@@ -173,7 +153,7 @@ fn pictures_agree_with_ray_casting() -> Result {
         ("60x40mm", NetPose { range_m: 0.6, tilt_x_deg: 40.0, roll_deg: -25.0, ..NetPose::default() }, 0.003),
         ("50x50mm@65deg", NetPose { range_m: 0.5, tilt_x_deg: 20.0, tilt_y_deg: -20.0, ..NetPose::default() }, 0.004),
     ] {
-        let mut scene = scene(mesh, pose)?;
+        let mut scene = quiet(mesh, pose);
         scene.layers[0].net.twine.diameter_m = twine_m;
         simulator.render(&scene, 1, &mut image)?;
         let expected = supersampled(&scene, &camera, &mesh.parse()?, 11);
@@ -191,11 +171,11 @@ fn pictures_agree_with_ray_casting() -> Result {
 fn truth_projects_to_itself() -> Result {
     // Closed form, so only rounding is left.
     const TINY: f64 = 1e-9;
-    let camera = thesis_camera();
+    let camera = camera();
     let mut simulator = Simulator::new(camera);
     let mut image = Image::default();
     for (mesh, pose) in ["50mm", "60x40mm", "25x25mm@70deg", "50mm"].into_iter().zip(poses()) {
-        let scene = scene(mesh, pose)?;
+        let scene = quiet(mesh, pose);
         let layer = &simulator.render(&scene, 1, &mut image)?.layers[0];
         let axis = layer.axis.ok_or("the axis meets the net")?;
         assert!((axis.range_m - pose.range_m).abs() < TINY, "{axis:?}");
@@ -216,11 +196,11 @@ fn truth_projects_to_itself() -> Result {
 #[test]
 fn a_net_that_fills_the_view_has_all_its_knots() -> Result {
     // Every knot of a lattice much larger than the view that projects into the picture must be listed, and no other.
-    let camera = thesis_camera();
+    let camera = camera();
     let mut simulator = Simulator::new(camera);
     let mut image = Image::default();
     for pose in poses() {
-        let scene = scene("50x40mm@75deg", pose)?;
+        let scene = quiet("50x40mm@75deg", pose);
         let layer = &simulator.render(&scene, 1, &mut image)?.layers[0];
         // Near the end of sight (four times the range at least) a knot may be in or out.
         let listed: BTreeSet<_> =
@@ -248,9 +228,9 @@ fn a_net_that_fills_the_view_has_all_its_knots() -> Result {
 
 #[test]
 fn finite_nets_end_where_they_should() -> Result {
-    let mut simulator = Simulator::new(thesis_camera());
+    let mut simulator = Simulator::new(camera());
     let mut image = Image::default();
-    let mut scene = scene("50mm", NetPose::at(1.5))?;
+    let mut scene = quiet("50mm", NetPose::at(1.5));
     scene.layers[0].net.extent = Extent::centred(10, 6);
     let layer = &simulator.render(&scene, 1, &mut image)?.layers[0];
     assert_eq!(layer.nodes.len(), 60);
@@ -266,9 +246,9 @@ fn finite_nets_end_where_they_should() -> Result {
 
 #[test]
 fn light_and_dark_nets_are_mirror_images() -> Result {
-    let mut simulator = Simulator::new(thesis_camera());
+    let mut simulator = Simulator::new(camera());
     let mut image = Image::default();
-    let mut light = scene("50mm", poses()[1])?;
+    let mut light = quiet("50mm", poses()[1]);
     light.water.veil_grey = 100.0;
     light.layers[0].net = Net { twine: Twine { grey: 160.0, ..Twine::default() }, ..Net::default() };
     let mut dark = light.clone();
