@@ -1,4 +1,4 @@
-//! Draws the first frame of every scenario onto one sheet: `cargo run -p net-sim --example contact_sheet -- sheet.png [name ...]`.
+//! Draws a frame of every scenario, or of those named, onto one sheet: `cargo run -p net-sim --example contact_sheet -- sheet.png [name ...]`.
 
 use image::{GrayImage, imageops};
 use net_sim::{Image, Scenario, Simulator};
@@ -12,8 +12,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let file = arguments.next().ok_or("usage: contact_sheet FILE.png [SCENARIO ...]")?;
     let names: Vec<String> = arguments.collect();
-    let all = Scenario::all();
-    let chosen: Vec<_> = all.iter().filter(|s| names.is_empty() || names.contains(&s.name)).collect();
+    let named: Result<Vec<_>, _> = names.iter().map(|name| Scenario::by_name(name)).collect();
+    let chosen = if names.is_empty() { Scenario::all() } else { named? };
     let columns = COLUMNS.min(chosen.len() as u32).max(1);
     let rows = (chosen.len() as u32).div_ceil(columns);
     let mut sheet = GrayImage::new(columns * TILE.0, rows * TILE.1);

@@ -33,6 +33,13 @@ pub struct LayerTruth {
 }
 
 impl LayerTruth {
+    /// Share of the knots in the picture that are in plain view, in [0, 1]; 0 if no knot is in the picture. A net with a share of 0.4 and
+    /// contrast above half the noise, where the axis meets it, is one that an estimator should find.
+    pub fn visible_share(&self) -> f64 {
+        let visible = self.nodes.iter().filter(|n| n.visibility == Visibility::Visible).count();
+        visible as f64 / self.nodes.len().max(1) as f64
+    }
+
     /// The flat lattice that touches the net where the optical axis meets it: the tangent plane, X along the first mesh direction
     /// there, the crossing angle there, and as its node `(0, 0)` the net's own, as if the net were spread flat on that plane.
     /// [`Lattice::canonical`] turns it into the form that an estimator's first picture has. `None` if the axis passes the net by.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result, within};
 use crate::random::{Addressed, Stream};
 use crate::scene::{Layer, Motion, NetPose, Scene};
+use crate::study::Study;
 
 /// Time of the first frame: 2023-11-14 22:13:20 UTC, a round number of seconds.
 const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
@@ -75,11 +76,18 @@ impl Scenario {
         catalogue::all()
     }
 
-    /// The scenario of this name. `fig-5.7` to `fig-5.9` show the picture of `fig-5.6`.
+    /// The scenario of this name. `fig-5.7` to `fig-5.9` show the picture of `fig-5.6`; `study-planar-17` is the scene of seed 17 of
+    /// [`Study::Planar`](crate::Study::Planar), and so with every study.
     ///
     /// # Errors
     /// [`Error::Name`] if there is none.
     pub fn by_name(name: &str) -> Result<Self> {
+        let study = name.strip_prefix("study-").and_then(|rest| rest.rsplit_once('-'));
+        if let Some((study, seed)) = study
+            && let (Ok(study), Ok(seed)) = (study.parse::<Study>(), seed.parse())
+        {
+            return Ok(study.scenario(seed));
+        }
         let known = match name {
             "fig-5.7" | "fig-5.8" | "fig-5.9" => "fig-5.6",
             other => other,

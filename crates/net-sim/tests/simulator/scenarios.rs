@@ -214,31 +214,94 @@ fn the_junction_grid_has_the_thesis_s_knots() -> Result {
 fn studies_cover_what_they_promise() -> Result {
     let range = |s: &Scene| s.layers[0].pose.range_m;
     let tilt = |s: &Scene| s.layers[0].pose.pose().normal().z.acos().to_degrees();
-    let (mut near, mut far, mut steep, mut dark, mut hidden) = (0, 0, 0, 0, 0);
+    let (mut near, mut far, mut steep, mut dark, mut hidden, mut ends, mut lens, mut meshes) = (0, 0, 0, 0, 0, 0, 0, 0);
     for seed in 0..300 {
         let planar = Study::planar(seed);
         planar.validate()?;
         assert_eq!(planar, Study::planar(seed));
         let scene = &planar.scene;
+        let net = &scene.layers[0].net;
         assert!((0.3..=8.0).contains(&range(scene)) && tilt(scene) <= 70.001, "{:?}", scene.layers[0].pose);
+        // The mesh that the user gives is the net's.
+        assert_eq!(planar.mesh()?, net.mesh()?, "seed {seed}");
         near += i32::from(range(scene) < 0.6);
         far += i32::from(range(scene) > 4.0);
         steep += i32::from(tilt(scene) > 50.0);
-        dark += i32::from(scene.layers[0].net.twine.grey < scene.water.veil_grey);
+        dark += i32::from(net.twine.grey < scene.water.veil_grey);
         hidden += i32::from(!scene.objects.is_empty());
+        ends += i32::from(net.extent != Extent::Full);
+        lens += i32::from(!planar.camera.distortion_coefficients.is_empty());
+        meshes += i32::from(planar.mesh != "50mm");
         let through = (-scene.water.attenuation_per_m * range(scene)).exp();
-        let contrast = (scene.layers[0].net.twine.grey - scene.water.veil_grey).abs() * through;
+        let contrast = (net.twine.grey - scene.water.veil_grey).abs() * through;
         let snr = contrast / scene.sensor.read_noise_grey;
         assert!((0.499..10.001).contains(&snr), "seed {seed}: {snr}");
-        Study::hung(seed).validate()?;
+        let hung = Study::hung(seed);
+        hung.validate()?;
+        assert!(hung.scene.layers[0].net.surface.isometric);
         let negative = Study::negative(seed);
         negative.validate()?;
         assert!(negative.scene.layers.is_empty());
+        for study in [Study::Noise, Study::Jitter2, Study::Jitter5, Study::Sag] {
+            let scenario = study.scenario(seed);
+            scenario.validate()?;
+            let net = &scenario.scene.layers[0].net;
+            // Nothing amiss but what the study is of.
+            let expected = match study {
+                Study::Jitter2 => 0.02,
+                Study::Jitter5 => 0.05,
+                _ => 0.0,
+            };
+            assert_eq!((net.jitter, net.surface.curvature_per_m != [0.0; 3]), (expected, study == Study::Sag));
+        }
     }
     // Each is expected in a fifth of the scenes or more (far and steep ones less often: their meshes must stay 3 px).
-    for (what, count) in [("near", near), ("far", far), ("steep", steep), ("dark", dark), ("hidden", hidden)] {
+    for (what, count) in [
+        ("near", near),
+        ("far", far),
+        ("steep", steep),
+        ("dark", dark),
+        ("hidden", hidden),
+        ("ends", ends),
+        ("lens", lens),
+        ("meshes", meshes),
+    ] {
         assert!((15..200).contains(&count), "{what}: {count} of 300");
     }
+    Ok(())
+}
+
+#[test]
+fn studies_have_names() -> Result {
+    for study in Study::ALL {
+        assert_eq!(study.name().parse::<Study>()?, study);
+        let scenario = study.scenario(17);
+        assert_eq!(Scenario::by_name(&scenario.name)?, scenario);
+    }
+    assert!("dreams".parse::<Study>().is_err());
+    assert!(Scenario::by_name("study-dreams-1").is_err() && Scenario::by_name("study-planar-x").is_err());
+    Ok(())
+}
+
+#[test]
+fn finite_study_nets_end_inside_the_view() -> Result {
+    // Of nets that end, those of the first 60 seeds: knots in the picture are fewer than without an end, and the axis meets the net.
+    let mut image = Image::default();
+    let mut met = 0;
+    for seed in 0..60 {
+        let scenario = Study::planar(seed);
+        let mut scene = scenario.scene.clone();
+        if scene.layers[0].net.extent == Extent::Full {
+            continue;
+        }
+        let mut simulator = Simulator::new(scenario.camera()?);
+        let layer = simulator.render(&scene, 1, &mut image)?.layers[0].clone();
+        assert!(layer.axis.is_some(), "seed {seed}");
+        assert!((0.0..=1.0).contains(&layer.visible_share()));
+        scene.layers[0].net.extent = Extent::Full;
+        met += i32::from(simulator.render(&scene, 1, &mut image)?.layers[0].nodes.len() > layer.nodes.len());
+    }
+    assert!(met > 3, "{met}");
     Ok(())
 }
 
