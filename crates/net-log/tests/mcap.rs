@@ -346,19 +346,26 @@ fn a_damaged_chunk_costs_its_own_frames_only() {
             damage[0].contains(&format!("the chunk at byte {} is damaged: ", chunk.chunk_start_offset)),
             "{damage:?}"
         );
-        // Those before and behind stand; of the chunk itself none is believed.
-        let good: Vec<_> = frames
-            .iter()
-            .filter_map(|f| Some((f.timestamp_ns? - START) / STEP).filter(|_| f.decode().is_ok()))
-            .collect();
-        assert_eq!(good, [0, 1, 2, 3, 8, 9, 10, 11], "{compression:?}");
+        // Those before and behind stand; of the chunk itself none is believed, and each has its number all the same.
+        assert_eq!(good(&frames), [0, 1, 2, 3, 8, 9, 10, 11], "{compression:?}");
+        assert_eq!(frames.iter().map(|f| f.index).collect::<Vec<_>>(), (0..12).collect::<Vec<_>>());
     }
-    // Damage between chunks: the summary knows where the next one is.
-    let mut bytes = mcap_bytes(&entries, Style { chunk_size: 4000, ..Style::default() });
-    let start = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes[1].chunk_start_offset as usize;
-    bytes[start] = 0;
-    let (frames, damage) = read_bytes(&bytes);
-    assert_eq!((frames.len(), damage.len()), (8, 1), "{damage:?}");
+    // Damage between chunks, and a chunk of absurd length: the summary knows where the next one is, and what was lost.
+    let whole = mcap_bytes(&entries, Style { chunk_size: 4000, ..Style::default() });
+    let start = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes[1].chunk_start_offset as usize;
+    for (at, value) in [(start, 0), (start + 7, 0x7F)] {
+        let mut bytes = whole.clone();
+        bytes[at] = value;
+        let (frames, damage) = read_bytes(&bytes);
+        assert_eq!((frames.len(), damage.len()), (12, 1), "{damage:?}");
+        assert_eq!(good(&frames), [0, 1, 2, 3, 8, 9, 10, 11]);
+    }
+}
+
+/// Numbers of the frames that decode to the picture of their number.
+fn good(frames: &[RawFrame]) -> Vec<u64> {
+    let right = |f: &&RawFrame| f.decode().is_ok_and(|p| p == picture(40, 30, f.index as usize));
+    frames.iter().filter(right).map(|f| f.index).collect()
 }
 
 /// What comes before `from` is counted by the index, not read: the numbers stay the same.
@@ -387,17 +394,27 @@ fn frames_keep_their_numbers_wherever_reading_begins() {
         assert_eq!(of(&format!("{}ns", START + 250_000_000_000), Some("260")), (250..=260).collect::<Vec<_>>());
         assert_eq!(of("400", None), [0; 0]);
     }
-    // Chunks that are passed over are not read: damage in one of them does not show.
-    let mut bytes = mcap_bytes(&entries, Style { chunk_size: 1500, ..Style::default() });
-    let chunk = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes[5].clone();
-    bytes[(chunk.chunk_start_offset + chunk.chunk_length - 3) as usize] ^= 0x55;
-    let (_dir, path) = file(&bytes);
-    for (from, damaged) in [("0", true), ("200", false)] {
-        let mut log = open(&path, &OpenOptions { from: from.parse().ok(), ..OpenOptions::default() }).unwrap();
-        // The frames of a damaged chunk are lost, and those after it are numbered without them.
-        let last = log.by_ref().last().unwrap().index;
-        assert!(if damaged { last < 299 } else { last == 299 }, "{last}");
-        assert_eq!(!log.damage().is_empty(), damaged, "{:?}", log.damage());
+    // Chunks that are passed over are not read: damage in one of them does not show. Where it does show, the frames that are lost
+    // have their numbers too, with or without a summary.
+    for (summary, first_read) in [(true, 200), (false, 0)] {
+        let style = Style { summary: true, chunk_size: 1500, ..Style::default() };
+        let chunk = mcap::Summary::read(&mcap_bytes(&entries, style)).unwrap().unwrap().chunk_indexes[5].clone();
+        let mut bytes = mcap_bytes(&entries, Style { summary, ..style });
+        bytes[(chunk.chunk_start_offset + chunk.chunk_length - 3) as usize] ^= 0x55;
+        let (_dir, path) = file(&bytes);
+        for (from, damaged) in [(0, true), (200, first_read < 200)] {
+            let options = OpenOptions { from: from.to_string().parse().ok(), ..OpenOptions::default() };
+            let mut log = open(&path, &options).unwrap();
+            let frames: Vec<_> = log.by_ref().collect();
+            assert!(frames.iter().map(|f| f.index).eq(from..300), "from {from}");
+            let readable = frames.iter().filter(|f| f.decode().is_ok()).inspect(|frame| {
+                assert_eq!(frame.timestamp_ns, Some(START + frame.index as i64 * 1_000_000_000));
+            });
+            let lost = frames.len() - readable.count();
+            // A chunk of 1500 bytes holds about ten of these messages.
+            assert!(if from == 0 { (5..15).contains(&lost) } else { lost == 0 }, "{lost} lost from {from}");
+            assert_eq!(!log.damage().is_empty(), damaged, "{:?}", log.damage());
+        }
     }
 }
 

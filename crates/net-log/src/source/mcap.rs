@@ -235,6 +235,14 @@ impl Iterator for McapFrames {
                 Event::Skipped { channel, messages } => {
                     self.next_index += if channels.contains_key(&channel) { messages } else { 0 };
                 }
+                Event::Lost { channel, messages, why } if channels.contains_key(&channel) => {
+                    for index in self.next_index..self.next_index + messages {
+                        let payload = Payload::Refused(FrameError::Read { why: why.to_owned() });
+                        self.ready.push_back(RawFrame { index, name: self.topic.clone(), timestamp_ns: None, payload });
+                    }
+                    self.next_index += messages;
+                }
+                Event::Lost { .. } => {}
                 Event::ChunkEnd(sound) => {
                     for mut frame in self.waiting.drain(..) {
                         if let Err(why) = &sound {

@@ -33,6 +33,8 @@ pub(super) enum Event<'a> {
     Skipped { channel: u16, messages: u64 },
     /// The chunk is over; its checksum was right, or why its messages can't be trusted.
     ChunkEnd(std::result::Result<(), String>),
+    /// So many messages of a channel were in a damaged chunk, by its index, and did not come out of it.
+    Lost { channel: u16, messages: u64, why: &'a str },
 }
 
 /// One file being read.
@@ -55,6 +57,8 @@ pub(super) struct Records {
 /// The chunk being read.
 struct Chunk {
     reader: LinearReader,
+    /// Messages of each channel that came out of it so far.
+    shown: BTreeMap<u16, u64>,
     /// Bytes of it that are still in the file.
     remaining: u64,
     /// Whether the file ends inside of it.
@@ -112,7 +116,13 @@ impl Records {
                 return Ok(());
             }
             Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                show(opcode, data, true, visit);
+                let shown = &mut chunk.shown;
+                show(opcode, data, true, &mut |event| {
+                    if let Event::Message { channel, .. } = event {
+                        *shown.entry(channel).or_default() += 1;
+                    }
+                    visit(event);
+                });
                 return Ok(());
             }
             None => Ok(()),
@@ -124,12 +134,15 @@ impl Records {
             self.damage.push(format!("{}: cut off at byte {}, inside of a chunk", self.name, self.length));
             self.ended = true;
         }
-        if let Err(why) = &sound {
-            self.damage.push(format!("{}: {why}", self.name));
-        }
-        visit(Event::ChunkEnd(sound));
-        self.position = self.file.seek(SeekFrom::Current(chunk.remaining as i64))?;
+        let (start, remaining, shown) = (self.position, chunk.remaining, std::mem::take(&mut chunk.shown));
         self.chunk = None;
+        self.position = self.file.seek(SeekFrom::Current(remaining as i64))?;
+        let why = sound.clone().err();
+        visit(Event::ChunkEnd(sound));
+        if let Some(why) = why {
+            self.damage.push(format!("{}: {why}", self.name));
+            self.tell_lost(start, &shown, &why, visit)?;
+        }
         Ok(())
     }
 
@@ -149,6 +162,13 @@ impl Records {
         let (length, left) = (u64::from_le_bytes(length), left - RECORD_HEADER);
         let cut_off = length > left;
         match opcode {
+            // The summary at the file's end is there, so it is the length that is wrong.
+            op::CHUNK if cut_off && self.places.range(self.position + 1..).next().is_some() => {
+                self.resume_behind(
+                    format!("the chunk at byte {} is damaged: its length is {length}", self.position),
+                    visit,
+                )?;
+            }
             op::CHUNK if self.places.get(&self.position).is_some_and(|p| p.skip) && !cut_off => self.skip(length)?,
             op::CHUNK if !cut_off && self.count_messages(visit)? => {
                 // Reading the indexes has moved the file's position.
@@ -164,10 +184,12 @@ impl Records {
                 let mut reader = LinearReader::new_with_options(options);
                 reader.insert(header.len()).copy_from_slice(&header);
                 reader.notify_read(header.len());
-                self.chunk = Some(Chunk { reader, remaining: length.min(left), cut_off });
+                self.chunk = Some(Chunk { reader, shown: BTreeMap::new(), remaining: length.min(left), cut_off });
             }
             op::DATA_END | op::FOOTER => self.ended = true,
-            _ if cut_off => self.resume_behind(format!("cut off at byte {}, inside of a record", self.length))?,
+            _ if cut_off => {
+                self.resume_behind(format!("cut off at byte {}, inside of a record", self.length), visit)?
+            }
             op::SCHEMA | op::CHANNEL | op::MESSAGE if length <= MAX_RECORD as u64 => {
                 let mut body = vec![0; length as usize];
                 self.file.read_exact(&mut body)?;
@@ -175,7 +197,7 @@ impl Records {
                 show(opcode, &body, false, visit);
             }
             op::HEADER | op::MESSAGE_INDEX..=op::SUMMARY_OFFSET | 0x80.. => self.skip(length)?,
-            _ => self.resume_behind(format!("no record at byte {}", self.position))?,
+            _ => self.resume_behind(format!("no record at byte {}", self.position), visit)?,
         }
         Ok(())
     }
@@ -186,24 +208,74 @@ impl Records {
         let Some(place) = self.places.get(&self.position).filter(|p| p.last_time < self.skip_before) else {
             return Ok(false);
         };
-        let mut counts = Vec::new();
-        for (&channel, &start) in &place.indexes {
+        let starts: Vec<u64> = place.indexes.values().copied().collect();
+        let mut counts = BTreeMap::new();
+        for start in starts {
             self.file.seek(SeekFrom::Start(start))?;
-            // Opcode, length, channel, and the bytes that its entries of 16 bytes take.
-            let mut index = [0; 15];
-            let whole = self.file.read_exact(&mut index).is_ok();
-            let [opcode, _, _, _, _, _, _, _, _, id0, id1, b0, b1, b2, b3] = index;
-            if !whole || opcode != op::MESSAGE_INDEX || u16::from_le_bytes([id0, id1]) != channel {
-                self.file.seek(SeekFrom::Start(self.position + RECORD_HEADER))?;
-                return Ok(false);
-            }
-            counts.push((channel, u64::from(u32::from_le_bytes([b0, b1, b2, b3]) / 16)));
+            let Some((channel, messages)) = self.read_index()? else {
+                counts.clear();
+                break;
+            };
+            counts.insert(channel, messages);
         }
         if counts.is_empty() {
+            self.file.seek(SeekFrom::Start(self.position + RECORD_HEADER))?;
             return Ok(false);
         }
         counts.into_iter().for_each(|(channel, messages)| visit(Event::Skipped { channel, messages }));
         Ok(true)
+    }
+
+    /// The message index where the file is: its channel, and how many messages it lists. `None`, if there is no such record.
+    fn read_index(&mut self) -> std::io::Result<Option<(u16, u64)>> {
+        // Opcode and length of the record; channel; bytes that the entries take, 16 each.
+        let mut head = [0; 15];
+        if let Err(error) = self.file.read_exact(&mut head) {
+            return if error.kind() == std::io::ErrorKind::UnexpectedEof { Ok(None) } else { Err(error) };
+        }
+        let [opcode, l0, l1, l2, l3, l4, l5, l6, l7, id0, id1, b0, b1, b2, b3] = head;
+        let length = u64::from_le_bytes([l0, l1, l2, l3, l4, l5, l6, l7]);
+        let bytes = u64::from(u32::from_le_bytes([b0, b1, b2, b3]));
+        let whole = opcode == op::MESSAGE_INDEX && bytes % 16 == 0 && length == bytes + 6 && bytes <= self.length;
+        if !whole {
+            return Ok(None);
+        }
+        self.file.seek_relative(bytes as i64)?;
+        Ok(Some((u16::from_le_bytes([id0, id1]), bytes / 16)))
+    }
+
+    /// Tells what the chunk at byte `start` held, by its indexes, besides the messages that were `shown`. The file is then where it was.
+    fn tell_lost(
+        &mut self,
+        start: u64,
+        shown: &BTreeMap<u16, u64>,
+        why: &str,
+        visit: &mut dyn FnMut(Event<'_>),
+    ) -> std::io::Result<()> {
+        let known = self.places.get(&start).map(|place| place.indexes.values().copied().collect::<Vec<_>>());
+        let mut counts = BTreeMap::new();
+        match known.filter(|indexes| !indexes.is_empty()) {
+            Some(indexes) => {
+                for index in indexes {
+                    self.file.seek(SeekFrom::Start(index))?;
+                    counts.extend(self.read_index()?);
+                }
+            }
+            // Without a summary: they follow the chunk.
+            None => {
+                while let Some((channel, messages)) = self.read_index()? {
+                    counts.insert(channel, messages);
+                }
+            }
+        }
+        self.file.seek(SeekFrom::Start(self.position))?;
+        for (channel, messages) in counts {
+            let messages = messages.saturating_sub(shown.get(&channel).copied().unwrap_or(0));
+            if messages > 0 {
+                visit(Event::Lost { channel, messages, why });
+            }
+        }
+        Ok(())
     }
 
     /// Passes over the body of a record.
@@ -215,14 +287,18 @@ impl Records {
     }
 
     /// Notes damage and goes on with the next chunk that the summary knows; ends if there is none.
-    fn resume_behind(&mut self, why: String) -> std::io::Result<()> {
-        self.damage.push(format!("{}: {why}", self.name));
-        match self.places.range(self.position + 1..).next() {
-            Some((&start, _)) if start < self.length => {
-                self.position = self.file.seek(SeekFrom::Start(start))?;
+    fn resume_behind(&mut self, why: String, visit: &mut dyn FnMut(Event<'_>)) -> std::io::Result<()> {
+        let next = self.places.range(self.position + 1..).next().map(|(&start, _)| start);
+        match next.filter(|&start| start < self.length) {
+            Some(next) => {
+                if self.places.contains_key(&self.position) {
+                    self.tell_lost(self.position, &BTreeMap::new(), &why, visit)?;
+                }
+                self.position = self.file.seek(SeekFrom::Start(next))?;
             }
-            _ => self.ended = true,
+            None => self.ended = true,
         }
+        self.damage.push(format!("{}: {why}", self.name));
         Ok(())
     }
 }

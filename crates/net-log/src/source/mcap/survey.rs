@@ -151,6 +151,7 @@ impl Survey {
                     cameras.insert(channel.topic.clone(), (kind, data.to_vec()));
                 }
             }
+            Event::Lost { channel, messages, .. } => *counts.entry(channel).or_default() += messages,
             Event::ChunkEnd(_) | Event::Skipped { .. } => {}
         }) {}
         Ok(Self { path: path.to_owned(), channels, counts: Some(counts), span, places: BTreeMap::new(), cameras })
