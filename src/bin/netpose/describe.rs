@@ -1,7 +1,7 @@
-//! Logs, cameras and meshes in words and in JSON.
+//! Logs and cameras in words and in JSON.
 
 use net_log::{LogInfo, TimeSource};
-use netpose::{Camera, Lens, Mesh};
+use netpose::{Camera, Lens};
 use serde_json::{Value, json};
 
 /// A log in a line.
@@ -45,33 +45,5 @@ fn lens(lens: &Lens) -> (&'static str, &[f64]) {
         Lens::PlumbBob(k) => ("plumb_bob", k),
         Lens::Rational(k) => ("rational_polynomial", k),
         Lens::KannalaBrandt(k) => ("equidistant", k),
-    }
-}
-
-/// The mesh in the words of `--cell`, so that it reads back as it was.
-pub fn mesh(mesh: &Mesh) -> String {
-    let mm = |m: f64| {
-        // 0.05 * 1e3 is 50.00000000000001 as often as not: a nanometre is enough.
-        let rounded = (m * 1e9).round() / 1e6;
-        format!("{rounded}")
-    };
-    let (a, b) = (mm(mesh.side1()), mm(mesh.side2()));
-    let sides = if a == b { format!("{a}mm") } else { format!("{a}x{b}mm") };
-    if mesh.is_right_angled() {
-        return sides;
-    }
-    let degrees = (mesh.angle().to_degrees() * 1e6).round() / 1e6;
-    format!("{a}x{b}mm@{degrees}deg")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::mesh;
-
-    #[test]
-    fn a_mesh_is_written_as_it_was_given() {
-        for text in ["50mm", "27.5mm", "60x40mm", "50x50mm@70deg", "15x20.25mm@101.5deg"] {
-            assert_eq!(mesh(&text.parse().unwrap()), text);
-        }
     }
 }
