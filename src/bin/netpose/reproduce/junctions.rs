@@ -28,10 +28,15 @@ pub fn run(columns: &[Column]) -> Result<Table> {
             visible.len()
         ),
     );
-    table.row(["thesis, clusters of 6 px", &JUNCTIONS_EPS_6.to_string(), "-", "-", "-"]);
-    table.row(["thesis, clusters of 3 px", &JUNCTIONS_EPS_3.to_string(), "-", "-", "-"]);
+    table.row(["thesis in print, clusters of 6 px", &JUNCTIONS_EPS_6.to_string(), "-", "-", "-"]);
+    table.row(["thesis in print, clusters of 3 px", &JUNCTIONS_EPS_3.to_string(), "-", "-", "-"]);
     for column in columns {
         let reading = Reading::new(&column.config, &scenario, &picture)?;
+        if reading.net.is_none() {
+            let refused = format!("refused, probability {:.2}", reading.probability);
+            table.row([column.name, &refused, "-", "-", "-"]);
+            continue;
+        }
         let found: Vec<Vector2<f64>> = reading.junctions.iter().map(|j| j.pixel).collect();
         let matched = match_one_to_one(&found, &visible);
         let share = |of: usize| format!("{:.3}", matched.len() as f64 / of.max(1) as f64);

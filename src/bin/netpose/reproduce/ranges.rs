@@ -10,7 +10,7 @@ use super::table::Table;
 
 /// One virtual grid at each distance.
 pub fn run(columns: &[Column]) -> Result<Table> {
-    let mut head = vec!["true range".to_owned(), "thesis".to_owned()];
+    let mut head = vec!["true range".to_owned(), "thesis in print".to_owned()];
     for column in columns {
         head.extend([format!("{}: range", column.name), "error".into(), "normal".into(), "probability".into()]);
     }

@@ -27,7 +27,8 @@ pub fn pictures(scenes: u32) -> u64 {
 
 /// All three tables in one, each cell the median over `scenes` pictures.
 pub fn run(columns: &[Column], scenes: u32, progress: &mut Progress) -> Result<Table> {
-    let mut head: Vec<String> = ["tilt", "axis", "z", "Schellewald 2021", "thesis"].map(Into::into).into();
+    let mut head: Vec<String> =
+        ["tilt", "axis", "z", "Schellewald 2021 in print", "thesis in print"].map(Into::into).into();
     for column in columns {
         let name = column.name;
         head.extend([format!("{name}: z (tilt)"), "normal".into(), "sign".into(), "answered".into(), "wrong".into()]);

@@ -33,7 +33,14 @@ pub fn run(columns: &[Column]) -> Result<Vec<Table>> {
 fn flow_table(there: &[Picture], back: &[Picture]) -> Result<Table> {
     let mut table = Table::new(
         "Drift of tracked junctions (section 5.5)",
-        ["", "thesis (optical flow by a network)", "ours: median", "p95", "knots followed", "ms per flow"],
+        [
+            "",
+            "thesis in print (optical flow by a network)",
+            "ours, block matching: median",
+            "p95",
+            "knots followed",
+            "ms per flow",
+        ],
         "Distance between where a knot was tracked to and where it is, px. The thesis tracked one junction, in about 3 s per flow on a \
          CPU. \"At once\" is ours started from the summed track and settled against the first frame.",
     );
