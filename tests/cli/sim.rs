@@ -73,6 +73,21 @@ fn a_virtual_net_is_found_where_it_is() {
     }
 }
 
+/// The tracker of a resumed run does not know the origin of the run before: its counts have numbers of their own.
+#[test]
+fn a_resumed_run_starts_another_count_of_cells() {
+    let scratch = Scratch::new();
+    assert_status(&sim(&scratch, "log", &[]), 0);
+    run(&scratch, "log", "out", &[]);
+    let whole = poses_without(&scratch, "out", &[]);
+    let track = whole[0].iter().position(|name| name == "track").expect("a column");
+    let text = std::fs::read_to_string(scratch.path("out/poses.csv")).unwrap();
+    scratch.write("out/poses.csv", text.lines().take(2).map(|line| line.to_owned() + "\n").collect::<String>());
+    run(&scratch, "log", "out", &["--resume"]);
+    let tracks: Vec<String> = poses_without(&scratch, "out", &[]).iter().map(|row| row[track].clone()).collect();
+    assert_eq!(tracks, ["track", "0", "1", "1"]);
+}
+
 #[test]
 fn the_same_seed_draws_the_same_log_and_mcap_holds_the_same_frames() {
     let scratch = Scratch::new();

@@ -36,6 +36,8 @@ fn values_that_cannot_be_read_are_wrong_usage() {
         (&["--from", "yesterday"], &["--from", "seconds"]),
         (&["--stride", "0"], &["--stride"]),
         (&["--jobs", "0"], &["--jobs"]),
+        (&["--cell", "0.05mm"], &["0.05mm", "1 mm to 2 m"]),
+        (&["--from", "-1"], &["--from", "-1", "seconds"]),
         (&["--resume", "--force"], &["--resume", "--force"]),
         (&["--no-such-flag"], &["--no-such-flag"]),
     ] {
@@ -44,6 +46,43 @@ fn values_that_cannot_be_read_are_wrong_usage() {
         assert_status(&output, 2);
         assert_says(&output, words);
     }
+}
+
+#[test]
+fn flags_that_contradict_each_other_or_the_log_are_wrong_usage() {
+    let scratch = Scratch::new();
+    scratch.image_log(2, 32, 24);
+    let output = scratch.run(&["--from", "5", "--to", "1"]);
+    assert_status(&output, 2);
+    assert_says(&output, &["--from is later than --to", "5 s", "1 s"]);
+    std::fs::remove_file(scratch.path("log/timestamps.csv")).unwrap();
+    let output = scratch.run(&["--fps", "0"]);
+    assert_status(&output, 2);
+    assert_says(&output, &["--fps is 0"]);
+    assert!(!scratch.path("out").exists());
+    // Results among the images would be part of the log the next time. Whatever the path's spelling.
+    let before = std::fs::read_dir(scratch.path("log")).unwrap().count();
+    let output = netpose()
+        .arg("run")
+        .arg(scratch.path("log"))
+        .arg("--camera")
+        .arg(scratch.path("camera.yaml"))
+        .args(["--cell", "50mm", "--out"])
+        .arg(scratch.path("log/../log"))
+        .output()
+        .unwrap();
+    assert_status(&output, 2);
+    assert_says(&output, &["--out", "is the log itself"]);
+    assert_eq!(std::fs::read_dir(scratch.path("log")).unwrap().count(), before);
+}
+
+#[test]
+fn a_part_of_the_log_without_a_frame_is_said_to_be_empty() {
+    let scratch = Scratch::new();
+    scratch.image_log(3, 32, 24);
+    let output = scratch.run(&["--from", "500"]);
+    assert_status(&output, 1);
+    assert_says(&output, &["no frame of the log was read", "from 500 s", "0.200 s long"]);
 }
 
 #[test]

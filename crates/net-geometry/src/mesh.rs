@@ -131,10 +131,10 @@ impl Mesh {
 
 /// What a mesh may be written as.
 const MESH_TEXT: &str = "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, \
-     50x50mm@60deg for an oblique mesh (sides up to 2 m, angle between 0 and 180 degrees)";
+     50x50mm@60deg for an oblique mesh (sides from 1 mm to 2 m, angle between 0 and 180 degrees)";
 
-/// Longest side taken from text, m: `50` is meant as millimetres, not as a net of 50 m meshes.
-const MAX_SIDE_IN_TEXT: f64 = 2.0;
+/// Sides taken from text, m: `50` is meant as millimetres, not as a net of 50 m meshes, and `0.05mm` as metres.
+const SIDES_IN_TEXT: std::ops::RangeInclusive<f64> = 0.001..=2.0;
 
 /// `50mm`, `5cm`, `0.05m`, `0.05` (metres), `50x40mm`, `50x50mm@60deg`.
 impl std::str::FromStr for Mesh {
@@ -155,7 +155,7 @@ fn parse(text: &str) -> Option<Mesh> {
     let (digits, per_metre) =
         units.into_iter().find_map(|(unit, n)| Some((sizes.trim_end().strip_suffix(unit)?, n)))?;
     let (a, b) = digits.split_once('x').unwrap_or((digits, digits));
-    let side = |digits| number(digits).map(|x| x / per_metre).filter(|&x| x <= MAX_SIDE_IN_TEXT);
+    let side = |digits| number(digits).map(|x| x / per_metre).filter(|x| SIDES_IN_TEXT.contains(x));
     Mesh::oblique(side(a)?, side(b)?, angle).ok()
 }
 

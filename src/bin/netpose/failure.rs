@@ -19,7 +19,7 @@ impl std::error::Error for Usage {}
 pub enum Outcome {
     /// All of it was read.
     Complete,
-    /// Results stand, but part of the input could not be read, or the command was stopped: exit status 1.
+    /// Results stand, but a frame could not be read, or the command was stopped: exit status 1.
     Partial,
 }
 
@@ -31,12 +31,37 @@ pub fn exit_code(done: anyhow::Result<Outcome>) -> ExitCode {
         // The reader of our output has gone (`netpose ... | head`): nobody is left to be told.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", text(&error));
             if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }
 
+/// The error with its causes, each said once: some repeat their cause in their own words.
+fn text(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |said, cause| match said.as_str() {
+        "" => cause,
+        earlier if earlier.contains(&cause) => said,
+        earlier => format!("{earlier}: {cause}"),
+    })
+}
+
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context;
+
+    use super::*;
+
+    #[test]
+    fn every_cause_is_said_once() {
+        let missing = || std::io::Error::from(std::io::ErrorKind::NotFound);
+        let error = anyhow::Error::from(missing()).context("cannot read a.yaml").context("--camera");
+        assert_eq!(text(&error), format!("--camera: cannot read a.yaml: {}", missing()));
+        let repeated = net_log::read_camera("no/such/file".as_ref()).context("--camera").unwrap_err();
+        assert_eq!(text(&repeated).matches("os error").count(), 1, "{}", text(&repeated));
+    }
 }

@@ -51,7 +51,7 @@ fn as_text(info: &LogInfo, size: Option<(usize, usize)>) -> String {
     }
     lines.push(format!("times     {}", describe::times(info)));
     if let Some((first, last)) = info.span_ns {
-        lines.push(format!("span      {first} to {last} ns: {:.3} s", (last - first) as f64 * 1e-9));
+        lines.push(format!("span      {first} to {last} ns: {:.3} s", last.abs_diff(first) as f64 * 1e-9));
     }
     lines.push(format!("camera    {}", camera(info)));
     if let Some(topic) = &info.topic {

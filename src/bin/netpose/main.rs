@@ -25,7 +25,8 @@ use clap::{Parser, Subcommand};
     about,
     max_term_width = 110,
     after_help = "\
-Exit status: 0 done (frames without a net are no errors), 1 the run failed or a frame could not be read, 2 wrong usage."
+Exit status: 0 done (frames without a net are no errors), 1 the command failed, was stopped, or a frame could not be \
+read (the results of all others stand), 2 wrong usage."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -39,7 +39,8 @@ impl Setup {
     /// The parameters, checked.
     pub fn config(&self) -> Result<Config> {
         let Some(path) = &self.config else { return Ok(Config::default()) };
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("--config: cannot read {}", path.display()))?;
         let config: Config = toml::from_str(&text).map_err(|e| Usage(format!("{}: {e}", path.display())))?;
         config.validate().map_err(|e| Usage(format!("{}: {e}", path.display())))?;
         Ok(config)
@@ -78,5 +79,6 @@ pub fn camera_unknown() -> anyhow::Error {
 }
 
 fn from_file(path: &std::path::Path) -> Result<KnownCamera> {
-    Ok(KnownCamera { camera: net_log::read_camera(path)?, origin: path.display().to_string() })
+    let camera = net_log::read_camera(path).context("camera")?;
+    Ok(KnownCamera { camera, origin: path.display().to_string() })
 }

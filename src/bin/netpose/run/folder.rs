@@ -37,6 +37,8 @@ pub struct Folder {
     summary: RunSummary,
     camera: Camera,
     last_frame: Option<u64>,
+    /// Number of this run's first count of cells: behind those of the runs that are resumed, whose origins it does not know.
+    first_track: u32,
     examples: Examples,
     decoding: TimingHistogram,
     tracking: TimingHistogram,
@@ -62,6 +64,8 @@ impl Folder {
             (RunFiles::create(dir, &APPENDED)?, Vec::new())
         };
         let last_frame = rows.last().map(|row| row.frame);
+        let tracks = rows.iter().filter_map(|row| row.appended.first().copied()).filter(|track| track.is_finite());
+        let first_track = tracks.fold(0, |next, track| next.max(track as u32 + 1));
         for row in &rows {
             summary.count(row.status);
         }
@@ -69,7 +73,8 @@ impl Folder {
         summary.write(&paths.summary())?;
         let (decoding, tracking, writing) = Default::default();
         let examples = Examples::default();
-        Ok(Self { files, summary, camera, last_frame, examples, decoding, tracking, writing, start: Instant::now() })
+        let start = Instant::now();
+        Ok(Self { files, summary, camera, last_frame, first_track, examples, decoding, tracking, writing, start })
     }
 
     /// Number of the last frame that an earlier run did.
@@ -92,7 +97,7 @@ impl Folder {
         let start = Instant::now();
         self.decoding.add(milliseconds(decoding));
         let row = match tracked {
-            Ok(tracked) => row(frame, tracked),
+            Ok(tracked) => row(frame, tracked, self.first_track),
             Err(_) => PoseRow::unreadable(frame.index, &frame.name, frame.timestamp_ns),
         };
         match tracked {
@@ -145,6 +150,11 @@ pub struct Finished {
 }
 
 impl Finished {
+    /// Whether there was no frame at all.
+    pub fn is_empty(&self) -> bool {
+        self.summary.frames.values().sum::<u64>() == 0
+    }
+
     /// The run in a line.
     pub fn line(&self) -> String {
         let frames: u64 = self.summary.frames.values().sum();
@@ -185,7 +195,7 @@ fn check_same(earlier: &RunSummary, now: &RunSummary) -> Result<()> {
     Ok(())
 }
 
-fn row(frame: &RawFrame, tracked: &Tracked) -> PoseRow {
+fn row(frame: &RawFrame, tracked: &Tracked, first_track: u32) -> PoseRow {
     let net = tracked.net.map(|net| NetColumns {
         range_m: net.range_m,
         distance_m: net.distance_m,
@@ -207,15 +217,15 @@ fn row(frame: &RawFrame, tracked: &Tracked) -> PoseRow {
         net,
         junctions: Some(tracked.junctions.len() as u64),
         latency_ms: Some(milliseconds(tracked.latency)),
-        appended: appended(tracked),
+        appended: appended(tracked, first_track),
     }
 }
 
-fn appended(tracked: &Tracked) -> Vec<f64> {
+fn appended(tracked: &Tracked, first_track: u32) -> Vec<f64> {
     // NaN is an empty cell.
     let mut cells = vec![f64::NAN; APPENDED.len()];
     let Some(net) = &tracked.net else { return cells };
-    cells[0] = f64::from(tracked.track);
+    cells[0] = f64::from(first_track.saturating_add(tracked.track));
     if let Some(sheet) = &net.sheet {
         cells[1] = sheet.crossing_angle.to_degrees();
         cells[2] = sheet.sigma_crossing_angle.to_degrees();

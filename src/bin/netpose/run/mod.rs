@@ -9,7 +9,7 @@ mod overlays;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use net_log::{LogInfo, LogSummary, OpenOptions, RunSummary, TimeBound};
 
 use crate::describe::{self, times};
@@ -32,10 +32,10 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
     /// First time to read: seconds after the log's first frame (12.5), or nanoseconds since 1970 (16 digits or more)
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
     from: Option<TimeBound>,
     /// Last time to read, in the same forms
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
     to: Option<TimeBound>,
     /// Read every N-th frame only
     #[arg(long, value_name = "N", default_value = "1")]
@@ -62,8 +62,10 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<Outcome> {
     let mesh = args.setup.mesh()?;
     let config = args.setup.config()?;
+    args.check()?;
     let log = net_log::open(&args.log, &args.open_options()).map_err(as_usage)?;
     let camera = args.setup.camera(log.info())?;
+    let span_ns = log.info().span_ns;
     eprintln!("{}", describe::log(log.info()));
     eprintln!("camera: {}", camera.origin);
     let interrupt = Interrupt::listen()?;
@@ -78,12 +80,17 @@ pub fn main(args: &Args) -> Result<Outcome> {
         Folder::prepare(&args.out, args.existing(), job.camera, args.summary(&job, &camera.origin, log.info())?)?;
     let finished = frames::process(log, &job, folder, &interrupt)?;
     println!("{}", finished.line());
+    if finished.is_empty() {
+        let length = span_ns.map_or(0.0, |(first, last)| last.abs_diff(first) as f64 * 1e-9);
+        bail!("no frame of the log was read ({}); it is {length:.3} s long", args.part());
+    }
     Ok(finished.outcome())
 }
 
-/// A topic that must be chosen, or is not there, is a matter of flags.
+/// A topic that must be chosen or is not there, and a value out of range, are matters of flags.
 fn as_usage(error: net_log::Error) -> anyhow::Error {
     match error {
+        net_log::Error::Value { field, value, expected } => Usage(format!("--{field} is {value}: {expected}")).into(),
         net_log::Error::SeveralTopics { .. } | net_log::Error::NoSuchTopic { .. } => Usage(error.to_string()).into(),
         other => other.into(),
     }
@@ -92,6 +99,24 @@ fn as_usage(error: net_log::Error) -> anyhow::Error {
 impl Args {
     fn open_options(&self) -> OpenOptions {
         OpenOptions { topic: self.topic.clone(), fps: self.fps, from: self.from, to: self.to, stride: self.stride }
+    }
+
+    /// What no single flag can see.
+    fn check(&self) -> Result<()> {
+        let backwards = match (self.from, self.to) {
+            (Some(TimeBound::AfterStart(from)), Some(TimeBound::AfterStart(to)))
+            | (Some(TimeBound::Epoch(from)), Some(TimeBound::Epoch(to))) => from > to,
+            _ => false,
+        };
+        if backwards {
+            bail!(Usage(format!("--from is later than --to: {}", self.part())));
+        }
+        let real = |path: &std::path::Path| path.canonicalize().ok();
+        if real(&self.log).is_some_and(|log| Some(log) == real(&self.out)) {
+            // Results beside the images would be read as part of the log the next time.
+            bail!(Usage(format!("--out {} is the log itself: give another folder", self.out.display())));
+        }
+        Ok(())
     }
 
     fn existing(&self) -> Existing {
@@ -117,7 +142,7 @@ impl Args {
                 ..LogSummary::default()
             },
             camera: describe::camera_json(&job.camera, camera_origin),
-            mesh: describe::mesh(&job.mesh),
+            mesh: job.mesh.to_string(),
             config: serde_json::to_value(&job.config).context("cannot write the configuration")?,
             ..RunSummary::default()
         })
@@ -125,15 +150,14 @@ impl Args {
 
     /// The part of the log that is read, in words.
     fn part(&self) -> String {
-        let time = |name: &str, bound: Option<TimeBound>| match bound {
-            Some(TimeBound::AfterStart(ns)) => format!("{name} {} s after the start, ", ns as f64 * 1e-9),
-            Some(TimeBound::Epoch(ns)) => format!("{name} {ns} ns, "),
-            None => String::new(),
+        let time = |name: &str, bound: TimeBound| match bound {
+            TimeBound::AfterStart(ns) => format!("{name} {} s after the start", ns as f64 / 1e9),
+            TimeBound::Epoch(ns) => format!("{name} {ns} ns"),
         };
-        match (self.from, self.to, self.stride.get()) {
-            (None, None, 1) => "all".into(),
-            (from, to, stride) => format!("{}{}every frame of {stride}", time("from", from), time("to", to)),
-        }
+        let bounds = [self.from.map(|b| time("from", b)), self.to.map(|b| time("to", b))];
+        let stride = (self.stride.get() > 1).then(|| format!("every frame of {}", self.stride));
+        let parts: Vec<String> = bounds.into_iter().chain([stride]).flatten().collect();
+        if parts.is_empty() { "all".into() } else { parts.join(", ") }
     }
 
     fn threads(&self) -> usize {
