@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
+mod calibrate;
 mod folder;
 mod mcap;
 mod run;

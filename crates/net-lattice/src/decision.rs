@@ -1,10 +1,12 @@
 //! Is it a net, and is the answer right? Statistics that a flexible fit cannot raise, and a probability from them.
 
+use serde::Serialize;
+
 use crate::fold::Fold;
 use crate::lockin::{Measurement, Window};
 
 /// Coherence of the phases left over in the tiles.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Evidence {
     /// Coherence of the fundamental per family: sqrt(2/N) times the sum of the cosines of the residual phases. Without a net about N(0, 1), a
     /// little more after a flexible fit.

@@ -1,5 +1,6 @@
 //! `netpose`: where is the net? One file per command; results on standard output or in files, everything else on standard error.
 
+mod calibrate;
 mod describe;
 mod draw;
 mod eval;
@@ -41,6 +42,7 @@ enum Command {
     Eval(eval::Args),
     Info(info::Args),
     Reproduce(reproduce::Args),
+    Calibrate(calibrate::Args),
 }
 
 fn main() -> ExitCode {
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::main(&args),
         Command::Info(args) => info::main(&args),
         Command::Reproduce(args) => reproduce::main(&args),
+        Command::Calibrate(args) => calibrate::main(&args),
     };
     failure::exit_code(done)
 }

@@ -4,7 +4,7 @@ mod junctions;
 mod published;
 mod ranges;
 mod reading;
-mod table;
+pub mod table;
 mod tilts;
 mod tracking;
 
