@@ -27,6 +27,21 @@ fn every_scenario_has_a_name_of_its_own_and_can_be_written_down() -> Result {
     Ok(())
 }
 
+/// The mesh that a scenario tells users to give is the one that is drawn first: a wrong one is a wrong range.
+#[test]
+fn every_scenario_names_the_mesh_it_draws() -> Result {
+    for scenario in Scenario::all() {
+        let Some(layer) = scenario.scene.layers.first() else { continue };
+        let (mesh, net) = (scenario.mesh()?, &layer.net);
+        let drawn = [net.side1_m, net.side2_m, net.angle_deg.to_radians()];
+        for (named, drawn) in [mesh.side1(), mesh.side2(), mesh.angle()].into_iter().zip(drawn) {
+            // Both were written as decimal numbers.
+            assert!((named - drawn).abs() < 1e-9, "{}: {named} named, {drawn} drawn", scenario.name);
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn the_same_scene_and_seed_make_the_same_bytes() -> Result {
     // Hashes of the middle frames' pictures, so that an unintended change of the simulator does not pass unseen. An intended one

@@ -95,10 +95,6 @@ pub(super) fn conditions() -> Vec<Scenario> {
         back.net.seed = 9;
         s.layers.push(back);
     });
-    add("knots", "A coarse dark net with tied knots and slack twine", tilted(0.9, 10.0, 12.0, 45.0), &|s| {
-        s.layers[0].net = Net { side1_m: 0.06, side2_m: 0.06, jitter: 0.03, slack: 0.025, ..s.layers[0].net.clone() };
-        s.layers[0].net.twine = Twine { diameter_m: 0.003, knot: 2.4, grey: 35.0, ..s.layers[0].net.twine };
-    });
     add("edge", "The net ends within the view", tilted(1.6, 0.0, 18.0, 3.0), &|s| {
         s.layers[0].net.extent = Extent::Cells { i: [-5, 60], j: [-60, 6] };
     });
@@ -108,6 +104,12 @@ pub(super) fn conditions() -> Vec<Scenario> {
     });
     add("defocus", "Out of focus by 2 px", tilted(1.0, 8.0, 8.0, 0.0), &|s| s.sensor.defocus_px = 2.0);
     add("jpeg", "Compressed to quality 20", tilted(1.2, 6.0, -9.0, 2.0), &|s| s.sensor.jpeg_quality = Some(20));
+    let mut knots =
+        named("knots", "A coarse dark net with tied knots and slack twine", ordinary(tilted(0.9, 10.0, 12.0, 45.0)));
+    let net = &mut knots.scene.layers[0].net;
+    *net = Net { side1_m: 0.06, side2_m: 0.06, jitter: 0.03, slack: 0.025, ..net.clone() };
+    net.twine = Twine { diameter_m: 0.003, knot: 2.4, grey: 35.0, ..net.twine };
+    knots.mesh = "60mm".to_owned();
     let mut rectangle = named("rectangle", "Meshes of 60 x 40 mm", ordinary(tilted(1.2, 10.0, 10.0, 10.0)));
     rectangle.scene.layers[0].net.side1_m = 0.06;
     rectangle.scene.layers[0].net.side2_m = 0.04;
@@ -137,7 +139,7 @@ pub(super) fn conditions() -> Vec<Scenario> {
         distortion_coefficients: vec![-0.02, 0.004, -0.002, 0.0004],
         ..CameraModel::default()
     };
-    list.extend([rectangle, diamond, fine, barrel, fisheye]);
+    list.extend([knots, rectangle, diamond, fine, barrel, fisheye]);
     list
 }
 
