@@ -4,7 +4,7 @@ use net_geometry::nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use crate::estimate::Labels;
 use crate::fit::{Fitter, Observation, Robust};
-use crate::surface::{PARAMETERS, Surface};
+use crate::surface::{PARAMETERS, Params, Surface};
 
 /// What is known of the errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,8 @@ pub(crate) struct Errors {
 }
 
 /// Covariance of the first `count` parameters: the formal one times the squared residual scale (a sheet that does not fit knows less), plus
-/// what sides that differ by `side_ratio` would do (considered, not estimated: it cannot be told from tilt and bend reliably).
+/// what residuals that are alike over `reach` px do ([`Fitter::scores`]: a sheet that bends otherwise than the model), plus what sides that
+/// differ by `side_ratio` would do (considered, not estimated: it cannot be told from tilt and bend reliably).
 pub(crate) fn parameters(
     fitter: &Fitter,
     surface: &Surface,
@@ -28,6 +29,8 @@ pub(crate) fn parameters(
     count: usize,
     scale: f64,
     side_ratio: f64,
+    reach: f64,
+    scratch: &mut Vec<(usize, Params)>,
 ) -> [[f64; PARAMETERS]; PARAMETERS] {
     // One family longer by the ratio, the other shorter: coordinates change in proportion to their distance from the axis.
     let stretch = |o: &Observation| {
@@ -42,13 +45,34 @@ pub(crate) fn parameters(
         consider[a] = side_ratio * (0..count).map(|b| formal[a][b] * pull[b]).sum::<f64>();
     }
     let s2 = scale.max(0.3).powi(2);
+    let alike = sandwich(formal, &fitter.scores(count, observations, robust, reach, scratch), count);
     let mut c = *formal;
     for a in 0..count {
         for b in 0..count {
-            c[a][b] = s2 * formal[a][b] + consider[a] * consider[b];
+            c[a][b] = s2 * formal[a][b] + alike[a][b] + consider[a] * consider[b];
         }
     }
     c
+}
+
+/// `a m a` over the first `count` rows and columns.
+fn sandwich(
+    a: &[[f64; PARAMETERS]; PARAMETERS],
+    m: &[[f64; PARAMETERS]; PARAMETERS],
+    count: usize,
+) -> [[f64; PARAMETERS]; PARAMETERS] {
+    let times = |x: &[[f64; PARAMETERS]; PARAMETERS], y: &[[f64; PARAMETERS]; PARAMETERS]| {
+        let mut z = [[0.0; PARAMETERS]; PARAMETERS];
+        for i in 0..count {
+            for k in 0..count {
+                for j in 0..count {
+                    z[i][j] += x[i][k] * y[k][j];
+                }
+            }
+        }
+        z
+    };
+    times(&times(a, m), a)
 }
 
 /// Carries it over to the pose in the net frame, by differences.

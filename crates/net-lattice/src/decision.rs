@@ -15,7 +15,8 @@ pub struct Evidence {
     pub v2: [f64; 2],
     /// Share of tiles with both residual phases below 1 rad.
     pub good: f64,
-    /// The same among the tiles about the optical axis, where range and normal are claimed; zero without such tiles.
+    /// The same among the tiles about the optical axis that are not empty (at least four tenths of them), where range and normal are
+    /// claimed; zero without such tiles.
     pub good_near: f64,
     /// Angle, rad, between the tangent plane on the axis and the mean plane about it. Where a sheet bends by more than the tolerance
     /// inside the view, "the" normal means little.
@@ -73,17 +74,20 @@ impl Evidence {
 
     /// Adds what is known about the optical axis.
     pub(crate) fn near(mut self, measurements: &[Measurement], window: Window) -> Self {
-        let mut aligned = 0;
+        let (mut aligned, mut empty) = (0, 0);
         for m in measurements {
             let (u, v) = (m.site.pixel[0] - window.centre[0], m.site.pixel[1] - window.centre[1]);
             if u.hypot(v) > window.radius {
                 continue;
             }
             self.near[1] += 1;
+            empty += usize::from(m.empty);
             self.near[0] += usize::from(m.good);
             aligned += usize::from(m.good && m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
         }
-        self.good_near = aligned as f64 / self.near[1].max(1) as f64;
+        // Where the net ends in view there may be few tiles about the axis, but not next to none.
+        let all = self.near[1].max(1) as f64;
+        self.good_near = aligned as f64 / (all - empty as f64).max(0.4 * all);
         self
     }
 
@@ -106,8 +110,13 @@ impl Evidence {
     ///
     /// Two logistic rules, both of which must hold: coherence of fundamental and second harmonic over the picture; the same with the share
     /// of agreeing tiles about the optical axis, where the claim is made. Then the chances that the pattern is one of two families of twine,
-    /// that all its cells are alike, and that tangent and mean plane are the same thing.
-    pub fn probability(&self) -> f64 {
+    /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker), that tiles about the axis
+    /// agree at all, that tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were the fit's own
+    /// standard deviation `tilt_sigma` (rad) true but for a factor.
+    ///
+    /// The numbers are set by hand on the simulator's studies (`net_sim::Study`) and half of a set of rendered stills; see the examples
+    /// `study` and `score` for what they lead to.
+    pub fn probability(&self, tilt_sigma: f64) -> f64 {
         // A pattern that happens to repeat once in a while can be coherent in its fundamental alone: that counts up to a point.
         let v = self.v[0].min(self.v[1]).min(6.0);
         let v2 = self.v2[0].abs().min(self.v2[1].abs());
@@ -115,7 +124,13 @@ impl Evidence {
         let everywhere = logistic(-5.0 + 0.55 * v + 0.55 * v2);
         let here = logistic(-5.5 + 0.31 * v + 5.9 * self.good_near + 0.39 * v2);
         let twine = logistic((self.separable - 0.82) / 0.02);
-        let alike = logistic((0.12 - self.unlike) / 0.015);
-        everywhere.min(here) * twine * alike * logistic((3.5 - self.bend.to_degrees()) / 0.4)
+        // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs.
+        let limit = (0.01 + 0.2 * self.balance).min(0.1);
+        let alike = logistic((limit - self.unlike) / 0.012);
+        let agreed = logistic((self.good_near - 0.38) / 0.03);
+        let straight = logistic((3.5 - self.bend.to_degrees()) / 0.4);
+        // Rayleigh, both axes alike. Where sheets are bent, errors are up to twice what the covariance says.
+        let normal = 1.0 - (-0.5 * (5f64.to_radians() / (2.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
+        everywhere.min(here) * twine * alike * agreed * straight * normal
     }
 }

@@ -8,7 +8,7 @@ use crate::decision::Evidence;
 use crate::error::Result;
 use crate::estimate::{Followed, Labels, LatticeEstimate};
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
-use crate::fold;
+use crate::fold::Folder;
 use crate::likelihood::{Drawing, Likelihood, Polarity};
 use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
@@ -17,7 +17,7 @@ use crate::numeric::magnitude_quantile;
 use crate::search::{self, Candidate, Scope, Search};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
-use crate::surface::{self, Surface};
+use crate::surface::{self, Params, Surface};
 use crate::view::View;
 
 /// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
@@ -34,6 +34,10 @@ const COLD: [(f64, Model); 7] = [
 const RIVAL: [(f64, Model); 2] = [(110.0, Model::Rhomb), (250.0, Model::Quadratic)];
 /// Rival depths: scaling depth by m scales every phase by m.
 const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Share of the strongest tiles' power below which a tile's weight falls.
+const WEAK: f64 = 0.04;
+/// Distance over which residuals of small tiles may be alike, px of an 848 x 480 px picture: three tiles.
+const REACH: f64 = 160.0;
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 /// Smallest cell, full-resolution px on the axis, that is looked for.
@@ -77,6 +81,9 @@ struct Tools {
     fitter: Fitter,
     likelihood: Likelihood,
     histogram: Vec<u32>,
+    scratch: Vec<f64>,
+    scores: Vec<(usize, Params)>,
+    folder: Folder,
     /// What `high` of each level holds: filter length, and the gain of the lock-in.
     high: [(f64, f32); 4],
 }
@@ -233,7 +240,7 @@ impl Workspace {
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
         demodulate::<SECOND>(level, place.1, &t.map, gain, window, &mut t.sums);
-        measure(surface, &self.view, place, sign, &t.sums, &mut t.measurements);
+        measure(surface, &self.view, place, sign, &t.sums, &mut t.scratch, &mut t.measurements);
     }
 
     /// A window about the optical axis, radius in px of an 848 x 480 px picture.
@@ -269,7 +276,10 @@ impl Workspace {
                     if !m.good || m.snr[f] <= 3.0 {
                         return 0.0;
                     }
-                    m.snr[f].min(60.0) * window.weight(m.site.pixel) * std::f64::consts::TAU.powi(2)
+                    m.snr[f].min(60.0)
+                        * (m.share[f] / WEAK).min(1.0)
+                        * window.weight(m.site.pixel)
+                        * std::f64::consts::TAU.powi(2)
                 };
                 let s = |f: usize| m.predicted.s[f] + m.phase[f] / std::f64::consts::TAU;
                 t.observations.push(Observation { site: m.site, s: [s(0), s(1)], weight: [w(0), 0.0, w(1)] });
@@ -430,7 +440,16 @@ impl Workspace {
                 s
             };
             let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
-            all.push((gain, m, Lock { surface, gain, polarity, blur, ..lock }));
+            // A lattice of which only every second or third line is there draws most of the picture, too.
+            let scale = self.view.levels[level].scale;
+            let (short, t) = (self.short_px(surface.depth) / scale, &mut self.tools);
+            let fold = t.folder.fold(&self.view.levels[level], &t.map, t.high[level].1, short);
+            let all_there = 1.0 - (2.0 * fold.unlike).min(1.0);
+            all.push((
+                gain * if gain > 0.0 { all_there } else { 1.0 },
+                m,
+                Lock { surface, gain, polarity, blur, ..lock },
+            ));
         }
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (gain, m, mut best) = *all.first()?;
@@ -524,6 +543,8 @@ impl Workspace {
         let surface = fit.surface;
         let labels = labels.unwrap_or_else(|| cold_labels(&surface));
         let count = model.parameters();
+        let reach =
+            REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
         let t = &mut self.tools;
         let scale = model::robust_scale(&t.fitter.whitened(&t.observations));
         let c = covariance::parameters(
@@ -535,14 +556,17 @@ impl Workspace {
             count,
             scale,
             config.side_ratio_sigma,
+            reach,
+            &mut t.scores,
         );
         let errors = covariance::pose(&surface, &labels, &c, count);
         let place = self.scale_for(surface.depth);
         self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
         let evidence = Evidence::new(&self.tools.measurements).near(&self.tools.measurements, self.window(220.0));
         let mean_plane = self.mean_plane(&surface);
-        let t = &self.tools;
-        let evidence = evidence.folded(fold::fold(&self.view.levels[place.0], &t.map, t.high[place.0].1));
+        let cell = self.short_px(surface.depth) / self.view.levels[place.0].scale;
+        let t = &mut self.tools;
+        let evidence = evidence.folded(t.folder.fold(&self.view.levels[place.0], &t.map, t.high[place.0].1, cell));
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {
@@ -557,7 +581,7 @@ impl Workspace {
             crossing_angle_sigma: errors.angle,
             curvatures: curvatures(&surface),
             sides: if odd { [surface.sides[1], surface.sides[0]] } else { surface.sides },
-            probability: evidence.probability(),
+            probability: evidence.probability(errors.tilt),
             evidence,
             gain: lock.gain / (self.view.levels[0].raw.data().len() as f64),
             margin,

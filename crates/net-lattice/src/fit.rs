@@ -180,6 +180,46 @@ impl Fitter {
         pull
     }
 
+    /// Covariance of the scores of the last linearization, J' W r, with residuals of neighbouring tiles taken together: a sheet that bends in
+    /// a way the model cannot leaves residuals that are alike over `reach` px (Conley 1999, Bartlett's kernel along u and v).
+    pub(crate) fn scores(
+        &self,
+        count: usize,
+        observations: &[Observation],
+        robust: Robust,
+        reach: f64,
+        scores: &mut Vec<(usize, Params)>,
+    ) -> [[f64; PARAMETERS]; PARAMETERS] {
+        scores.clear();
+        for (t, ((o, r), j)) in observations.iter().zip(&self.residuals).zip(&self.jacobian).enumerate() {
+            if r[0].is_nan() {
+                continue;
+            }
+            let w = robust.weigh(o.weight, *r);
+            let wr = [w[0] * r[0] + w[1] * r[1], w[1] * r[0] + w[2] * r[1]];
+            scores.push((t, std::array::from_fn(|k| if k < count { j[0][k] * wr[0] + j[1][k] * wr[1] } else { 0.0 })));
+        }
+        let mut sum = [[0.0; PARAMETERS]; PARAMETERS];
+        for (t, a) in scores.iter() {
+            // The neighbours' scores, weighted.
+            let mut near = [0.0; PARAMETERS];
+            for (s, b) in scores.iter() {
+                let at = |k: usize| observations[k].site.pixel;
+                let kernel = |axis: usize| (1.0 - (at(*t)[axis] - at(*s)[axis]).abs() / reach).max(0.0);
+                let w = kernel(0) * kernel(1);
+                if w > 0.0 {
+                    near.iter_mut().zip(b).for_each(|(n, b)| *n += w * b);
+                }
+            }
+            for i in 0..count {
+                for j in 0..count {
+                    sum[i][j] += a[i] * near[j];
+                }
+            }
+        }
+        sum
+    }
+
     /// Fits the first `count` parameters. `None` when the sheet runs away.
     pub(crate) fn fit(
         &mut self,

@@ -1,85 +1,176 @@
 //! All cells laid on top of each other: what the average cell looks like. Two families of twine make it a sum of a function of the first
 //! coordinate and one of the second (but for the knots); bricks, scales, honeycombs and other lattices that are no net do not.
+//!
+//! The average is taken as a Fourier series over six cells by six, summed over the picture's own pixels: cells that are a whole number of
+//! pixels wide show only a few phases, and bins that stay empty would look like cells that differ. Six are two by three: a lattice of
+//! which only every second, third or fourth line exists shows in waves longer than a cell.
 
 use crate::map::PhaseMap;
 use crate::numeric::wrap;
 use crate::view::{BLOCK, Level};
 
-/// Bins along a side of the cell.
-const BINS: usize = 12;
-/// Bins along a side of two cells by two.
-const WIDE: usize = 2 * BINS;
+/// Cells folded side by side.
+const CELLS: usize = 6;
+/// Bins along them.
+const WIDE: usize = 16 * CELLS;
+/// Highest harmonic of the cell.
+const HARMONICS: usize = 3;
+/// The same in units of the wave as long as all the cells.
+const ORDERS: usize = CELLS * HARMONICS;
 
 /// The average cell in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Fold {
-    /// Share of its variance that is a sum of functions of one coordinate each.
+    /// Share of its power in waves along one family's coordinate alone.
     pub separable: f64,
-    /// Variance along the weaker family over that along the stronger.
+    /// Power along the weaker family over that along the stronger.
     pub balance: f64,
-    /// Share of the variance of two by two cells in which they differ: bricks, and lattices of which only every second line exists.
+    /// Share of the power in waves two or three cells long and their harmonics: bricks, and lattices of which only every second or third
+    /// line exists.
     pub unlike: f64,
-    /// Variance over that of noise.
+    /// Power over that of noise.
     pub snr: f64,
 }
 
-/// Folds the high-passed picture of a level. Two halves of the picture are folded apart and only what they have in common counts, so
-/// noise adds nothing on average.
-pub(crate) fn fold(level: &Level, map: &PhaseMap, gain: f32) -> Fold {
-    let mut sums = [[0.0f64; WIDE * WIDE]; 2];
-    let mut counts = [[0u32; WIDE * WIDE]; 2];
-    let (bx, by) = level.blocks();
-    let bin = |s: f32| (((wrap(0.5 * s) + 0.5) * WIDE as f32) as usize).min(WIDE - 1);
-    for y in 0..by {
-        for x in 0..bx {
-            let Some([p, q]) = map.block(x, y) else { continue };
-            let half = (x / 2 + y / 2) % 2;
-            for r in 0..BLOCK {
-                let row = &level.high.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
-                let v = r as f32 - 1.5;
-                for (c, i) in row.iter().enumerate() {
-                    let u = c as f32 - 1.5;
-                    let k = bin(p.s + p.du * u + p.dv * v) * WIDE + bin(q.s + q.du * u + q.dv * v);
-                    sums[half][k] += f64::from((i * gain).clamp(-1.0, 1.0));
-                    counts[half][k] += 1;
+/// Sums over two halves of the picture, kept between pictures.
+#[derive(Debug, Default)]
+pub(crate) struct Folder {
+    /// Two halves, the second coordinate runs fastest: brightness and number of pixels.
+    sums: Vec<[f64; 2]>,
+    /// cos and sin of a turn in `WIDE` steps.
+    wave: Vec<[f64; 2]>,
+    /// Transform along the second coordinate: half, bin of the first, order.
+    rows: Vec<[f64; 2]>,
+}
+
+impl Folder {
+    /// Folds the high-passed picture of a level. Two random halves of it are folded apart and only what they have in common counts, so
+    /// noise adds nothing on average. `cell`: its length on the axis, px of the level; waves beyond the pixels' own limit are left out.
+    pub(crate) fn fold(&mut self, level: &Level, map: &PhaseMap, gain: f32, cell: f64) -> Fold {
+        self.sums.clear();
+        self.sums.resize(2 * WIDE * WIDE, [0.0; 2]);
+        let (bx, by) = level.blocks();
+        let bin = |s: f32| (((wrap(s / CELLS as f32) + 0.5) * WIDE as f32) as usize).min(WIDE - 1);
+        let mut total = [[0.0; 2]; 2];
+        for y in 0..by {
+            for x in 0..bx {
+                let Some([p, q]) = map.block(x, y) else { continue };
+                let half = coin(x, y);
+                let sums = &mut self.sums[half * WIDE * WIDE..][..WIDE * WIDE];
+                for r in 0..BLOCK {
+                    let row = &level.high.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
+                    let v = r as f32 - 1.5;
+                    for (c, i) in row.iter().enumerate() {
+                        let u = c as f32 - 1.5;
+                        let k = bin(p.s + p.du * u + p.dv * v) * WIDE + bin(q.s + q.du * u + q.dv * v);
+                        let value = f64::from((i * gain).clamp(-1.0, 1.0));
+                        sums[k][0] += value;
+                        sums[k][1] += 1.0;
+                        total[half][0] += value;
+                        total[half][1] += 1.0;
+                    }
+                }
+            }
+        }
+        if total[0][1] == 0.0 || total[1][1] == 0.0 {
+            return Fold::default();
+        }
+        self.along_second(total);
+        self.summary(((0.5 * CELLS as f64 * cell).ceil() as usize).saturating_sub(1).clamp(CELLS, ORDERS))
+    }
+
+    /// Fourier sums along the second coordinate, orders 0 and up, of brightness less its mean, per pixel.
+    fn along_second(&mut self, total: [[f64; 2]; 2]) {
+        let wave = |k: usize| {
+            let (s, c) = (std::f64::consts::TAU * k as f64 / WIDE as f64).sin_cos();
+            [c, s]
+        };
+        if self.wave.is_empty() {
+            self.wave.extend((0..WIDE).map(wave));
+        }
+        self.rows.clear();
+        for (half, [sum, count]) in total.into_iter().enumerate() {
+            let mean = sum / count;
+            for line in self.sums[half * WIDE * WIDE..][..WIDE * WIDE].chunks_exact(WIDE) {
+                for order in 0..=ORDERS {
+                    let mut z = [0.0; 2];
+                    for (k, [s, n]) in line.iter().enumerate() {
+                        let w = self.wave[k * order % WIDE];
+                        let value = (s - mean * n) / count;
+                        z[0] += value * w[0];
+                        z[1] -= value * w[1];
+                    }
+                    self.rows.push(z);
                 }
             }
         }
     }
-    let mut wide = [[0.0f64; WIDE * WIDE]; 2];
-    let mut cell = [[0.0f64; BINS * BINS]; 2];
-    for h in 0..2 {
-        let (mut mean, mut filled) = (0.0, 0.0);
-        for k in 0..WIDE * WIDE {
-            if counts[h][k] > 0 {
-                wide[h][k] = sums[h][k] / f64::from(counts[h][k]);
-                mean += wide[h][k];
-                filled += 1.0;
+
+    /// Coefficient of a wave: order along the first coordinate (any sign), along the second (0 and up).
+    fn coefficient(&self, half: usize, first: isize, second: usize) -> [f64; 2] {
+        let mut z = [0.0; 2];
+        for k in 0..WIDE {
+            let r = self.rows[(half * WIDE + k) * (ORDERS + 1) + second];
+            let w = self.wave[(k as isize * first).rem_euclid(WIDE as isize) as usize];
+            z[0] += r[0] * w[0] + r[1] * w[1];
+            z[1] += r[1] * w[0] - r[0] * w[1];
+        }
+        z
+    }
+
+    /// From all orders up to `highest`.
+    fn summary(&self, highest: usize) -> Fold {
+        let (mut along, mut repeats, mut differs, mut noise) = ([0.0f64; 2], 0.0, [[0.0f64; 2]; 3], 0.0);
+        for second in 0..=highest {
+            let least = if second == 0 { 1 } else { -(highest as isize) };
+            for first in least..=highest as isize {
+                let (a, b) = (self.coefficient(0, first, second), self.coefficient(1, first, second));
+                let common = a[0] * b[0] + a[1] * b[1];
+                // Steps of two or three along both: periods of three or two cells.
+                let coarse = |step: usize| first.unsigned_abs().is_multiple_of(step) && second.is_multiple_of(step);
+                let kind = match (coarse(2), coarse(3)) {
+                    (true, true) => None,
+                    (true, false) => Some(0),
+                    (false, true) => Some(1),
+                    (false, false) => Some(2),
+                };
+                if let Some(kind) = kind {
+                    differs[kind][0] += common;
+                    differs[kind][1] += 1.0;
+                    continue;
+                }
+                repeats += common;
+                noise += 0.25 * ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
+                if second == 0 {
+                    along[0] += common;
+                } else if first == 0 {
+                    along[1] += common;
+                }
             }
         }
-        let mean = mean / f64::max(filled, 1.0);
-        for k in 0..WIDE * WIDE {
-            wide[h][k] = if counts[h][k] > 0 { wide[h][k] - mean } else { 0.0 };
-            cell[h][k / WIDE % BINS * BINS + k % BINS] += 0.25 * wide[h][k];
+        if repeats <= 0.0 {
+            return Fold::default();
+        }
+        let [a, b] = along.map(|p| p.max(0.0));
+        // Waves six cells long and their harmonics are neither: what is in them leaked, where few cells are in view or fish cover some.
+        let leak = (differs[2][0] / f64::max(differs[2][1], 1.0)).max(0.0);
+        let unlike = |kind: usize| {
+            let d = (differs[kind][0] - leak * differs[kind][1]).max(0.0);
+            d / (repeats + d)
+        };
+        Fold {
+            separable: (a + b) / repeats,
+            balance: a.min(b) / a.max(b).max(1e-12),
+            unlike: unlike(0).max(unlike(1)),
+            snr: repeats / noise.max(1e-12),
         }
     }
-    let common = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
-    let all = common(&wide[0], &wide[1]);
-    let n = (BINS * BINS) as f64;
-    let total = cell[0].iter().zip(&cell[1]).map(|(a, b)| a * b).sum::<f64>() / n;
-    let noise = cell[0].iter().zip(&cell[1]).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / (4.0 * n);
-    let line = |h: usize, i: usize, first: bool| {
-        (0..BINS).map(|j| cell[h][if first { i * BINS + j } else { j * BINS + i }]).sum::<f64>() / BINS as f64
-    };
-    let along = |first: bool| (0..BINS).map(|i| line(0, i, first) * line(1, i, first)).sum::<f64>() / BINS as f64;
-    let (a, b) = (along(true).max(0.0), along(false).max(0.0));
-    if total <= 0.0 {
-        return Fold::default();
-    }
-    Fold {
-        separable: (a + b) / total,
-        unlike: (1.0 - total / all.max(1e-12)).max(0.0),
-        balance: a.min(b) / a.max(b).max(1e-12),
-        snr: total / noise.max(1e-12),
-    }
+}
+
+/// Which half a block belongs to: without a pattern of its own that could beat with the net's.
+fn coin(x: usize, y: usize) -> usize {
+    let mut h = (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
+    ((h >> 15) & 1) as usize
 }

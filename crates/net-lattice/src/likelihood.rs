@@ -98,7 +98,10 @@ impl Likelihood {
             small.resize(bx, by);
         }
         let every = level.high.data().iter().copied();
-        self.noise = (1.4826 * magnitude_quantile(every, 0.5, &mut self.histogram)).max(1e-6);
+        // Most of a picture may be empty: not less than a few per cent of what stands out in it.
+        let contrast = magnitude_quantile(every.clone(), 0.97, &mut self.histogram);
+        let middle = magnitude_quantile(every, 0.5, &mut self.histogram);
+        self.noise = (1.4826 * middle).max(0.04 * contrast).max(1e-6);
     }
 
     /// Twine widths along the two families, cells.

@@ -1,7 +1,7 @@
 //! Lock-in: the picture multiplied by the predicted waves and summed over tiles. What phase is left over says where the lattice really is.
 
 use crate::map::{PhaseMap, Plane};
-use crate::numeric::sin_cos_cycles;
+use crate::numeric::{quantile, sin_cos_cycles};
 use crate::surface::{Point, Surface};
 use crate::view::{BLOCK, Level, Site, View};
 
@@ -34,8 +34,12 @@ pub(crate) struct Measurement {
     pub k: [f64; 2],
     /// Demodulated sums.
     pub z: [[f64; 2]; 2],
-    /// Whether it counts: enough of it shows the sheet, and cells there are wider than 3 px.
+    /// Power in the wave against that of the strongest tiles: small where the net has ended and noise is left.
+    pub share: [f64; 2],
+    /// Whether it counts: enough of it shows the sheet, cells there are wider than 3 px, and it is not empty beside the others.
     pub good: bool,
+    /// Next to nothing is in it.
+    pub empty: bool,
 }
 
 /// Which part of the picture a lock-in looks at.
@@ -136,20 +140,37 @@ fn wave(p: &[[f32; 4]; 4], du: f32, dv: f32) -> (f32, f32) {
     (re, im)
 }
 
+/// Quantile of the tiles that counts as the strongest.
+const STRONG: f64 = 0.95;
+/// A tile with less than this share of the power of the strongest, whatever its phases, says nothing: open water beside the net's end.
+const EMPTY: f64 = 0.03;
+
+fn norm(z: [f64; 2]) -> f64 {
+    z[0] * z[0] + z[1] * z[1]
+}
+
 /// Turns sums into measurements.
 ///
-/// `sign`: 1 for bright twine, -1 for dark.
+/// `sign`: 1 for bright twine, -1 for dark. `scratch` is overwritten.
 pub(crate) fn measure(
     surface: &Surface,
     view: &View,
     (level, tiling): (usize, usize),
     sign: f64,
     sums: &[TileSum],
+    scratch: &mut Vec<f64>,
     out: &mut Vec<Measurement>,
 ) {
     let chart = surface.chart();
     let level = &view.levels[level];
     let grid = &level.tiles[tiling];
+    let mut strongest = |value: &dyn Fn(&TileSum) -> f64| {
+        scratch.clear();
+        scratch.extend(sums.iter().filter(|s| s.count > 0.0).map(value));
+        quantile(scratch, STRONG)
+    };
+    let strong = [0, 1].map(|f: usize| strongest(&|s| norm(s.z[f])).max(1e-12));
+    let busy = strongest(&|s| s.power / s.count);
     out.clear();
     for (site, sum) in grid.sites.iter().zip(sums) {
         let mut m = Measurement {
@@ -160,7 +181,9 @@ pub(crate) fn measure(
             snr: [0.0; 2],
             k: [f64::INFINITY; 2],
             z: sum.z,
+            share: [0.0; 2],
             good: false,
+            empty: false,
         };
         let at = |r: &[f64; 2]| chart.at(r[0], r[1]);
         if let (true, Some(p), Some(pu), Some(pv)) = (site.valid, at(&site.ray), at(&site.next[0]), at(&site.next[1])) {
@@ -168,11 +191,13 @@ pub(crate) fn measure(
             for f in 0..2 {
                 m.phase[f] = (sign * sum.z[f][1]).atan2(sign * sum.z[f][0]);
                 m.phase2[f] = (sign * sum.z2[f][1]).atan2(sign * sum.z2[f][0]);
-                m.snr[f] = (sum.z[f][0].powi(2) + sum.z[f][1].powi(2)) / (0.5 * sum.power + 1e-9);
+                m.snr[f] = norm(sum.z[f]) / (0.5 * sum.power + 1e-9);
+                m.share[f] = norm(sum.z[f]) / strong[f];
                 m.k[f] = (pu.s[f] - p.s[f]).hypot(pv.s[f] - p.s[f]);
             }
             let resolved = m.k[0].max(m.k[1]) < 1.0 / (3.0 * view.reduction as f64);
-            m.good = sum.count > 0.5 * grid.area && resolved;
+            m.empty = sum.power < EMPTY * busy * sum.count;
+            m.good = sum.count > 0.5 * grid.area && resolved && !m.empty;
         }
         out.push(m);
     }

@@ -81,11 +81,16 @@ pub(crate) fn magnitude_quantile(values: impl Iterator<Item = f32> + Clone, q: f
 
 /// Median of the values, which it reorders. Zero for none.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The `q` quantile of `values`, which it reorders. Zero for none.
+pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    let mid = values.len() / 2;
-    *values.select_nth_unstable_by(mid, f64::total_cmp).1
+    let k = ((values.len() as f64 * q) as usize).min(values.len() - 1);
+    *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
 /// Symmetric positive definite system of up to `N` unknowns, on the stack.

@@ -6,6 +6,7 @@
 
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 
+use crate::numeric::log2_rough;
 use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
 use crate::view::View;
 
@@ -17,6 +18,11 @@ const TILTS: [f64; 8] = [0.0, 11.0, 22.0, 33.0, 44.0, 54.0, 63.0, 70.0];
 const HARMONICS: [usize; 6] = [0, 12, 19, 24, 28, 31];
 /// Variance of a blurred, clipped, whitened bin.
 const VARIANCE: f64 = 0.45;
+/// Whitened power from which a wave's vote grows with the logarithm only.
+const SOFT: f32 = 4.0;
+
+/// Score where too few tiles can tell.
+const NOTHING: f32 = -9.0;
 
 /// A plane worth a lock-in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,17 +182,20 @@ impl Search {
                 }
             }
         }
-        // Harmonics, and the score of one family.
+        // Harmonics, and the score of one family: as many harmonics as do it good, since blur leaves only the lowest.
         for c in 0..cells {
             let (sums, counts) = (&self.sums[c * steps..][..steps], &self.counts[c * steps..][..steps]);
             let out = &mut self.scores[c * steps..][..steps];
             for i in self.depths.clone() {
                 let (mut s, mut n) = (0.0f32, 0u32);
+                out[i] = NOTHING;
                 for h in HARMONICS {
                     s += sums[i + h];
                     n += u32::from(counts[i + h]);
+                    if n >= 4 {
+                        out[i] = out[i].max(s / (n as f32 * VARIANCE as f32).sqrt());
+                    }
                 }
-                out[i] = if n < 4 { -9.0 } else { s / (n as f32 * VARIANCE as f32).sqrt() };
             }
         }
     }
@@ -266,8 +275,8 @@ pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) 
     let det = cd * cd - sd * sd;
     let sides = scope.sides;
     let dual = [[cd / det / sides[0], -sd / det / sides[0]], [-sd / det / sides[1], cd / det / sides[1]]];
-    let mut sum = [0.0f64; 2];
-    let mut count = [0.0f64; 2];
+    let mut sum = [[0.0f64; 6]; 2];
+    let mut count = [[0.0f64; 6]; 2];
     let n = SIZE as f64;
     for (t, site) in bank.sites.iter().enumerate() {
         let Some(g) = gradient(&c.rotation, site) else { continue };
@@ -282,8 +291,8 @@ pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) 
             if len * (bank.length as f64) < 0.4 {
                 continue;
             }
-            for h in 1..=6 {
-                let h = f64::from(h);
+            for order in 0..6 {
+                let h = (order + 1) as f64;
                 if h * len > HIGHEST {
                     break;
                 }
@@ -299,15 +308,28 @@ pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) 
                 let a = &power[ix * SIZE + iy..][..2];
                 let b = &power[(ix + 1) * SIZE + iy..][..2];
                 let p = (1.0 - fx) * (a[0] + fy * (a[1] - a[0])) + fx * (b[0] + fy * (b[1] - b[0]));
-                sum[f] += f64::from(p.min(12.0)) - 1.0;
-                count[f] += 1.0;
+                // Clipped softly: a plateau would hide where strong waves are highest.
+                sum[f][order] += f64::from(SOFT * log2_rough(1.0 + p / SOFT)) - 1.1;
+                count[f][order] += 1.0;
             }
         }
     }
-    if count[0] < 4.0 || count[1] < 4.0 {
-        return -9.0;
+    // Blur leaves the lowest harmonics only: as many are counted as do the hypothesis good.
+    let family = |f: usize| {
+        let (mut s, mut n, mut best) = (0.0, 0.0, f64::from(NOTHING));
+        for (sum, count) in sum[f].iter().zip(&count[f]) {
+            s += sum;
+            n += count;
+            if n >= 4.0 {
+                best = f64::max(best, s / n.sqrt());
+            }
+        }
+        best
+    };
+    let (a, b) = (family(0), family(1));
+    if a.min(b) <= f64::from(NOTHING) {
+        return f64::from(NOTHING);
     }
-    let (a, b) = (sum[0] / count[0].sqrt(), sum[1] / count[1].sqrt());
     let prior = if scope.angle_sigma > 0.0 { (c.angle - scope.angle) / (1.2 * scope.angle_sigma) } else { 0.0 };
     0.5 * a.min(b) + 0.25 * (a + b) - 0.5 * prior * prior
 }
@@ -357,7 +379,7 @@ pub(crate) fn add_rivals(bank: &Bank, scale: f64, scope: &Scope, range: (f64, f6
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     for k in 0..found.len().min(3) {
         let best = found[k];
-        for m in [0.5, 2.0 / 3.0, 1.5, 2.0, 3.0] {
+        for m in [0.5, 2.0 / 3.0, 1.5, 2.0, 3.0, 4.0] {
             let mut rival = best;
             rival.depth *= m;
             if rival.depth < range.0 || rival.depth > range.1 {

@@ -20,6 +20,9 @@ pub(crate) const COLUMNS: usize = 112;
 pub(crate) const HIGHEST: f64 = 0.42;
 /// Whitened power is clipped here: one strong peak must not outvote the other tiles.
 const CAP: f32 = 12.0;
+/// Noise that every picture is taken to have, of what counts as full contrast in it. Without it a drawn picture without noise is whitened
+/// by the leakage of its own edges.
+const LEAST_NOISE: f32 = 0.01;
 /// Bins along a side of the blocks from which the noise floor is taken.
 const FLOOR: usize = 4;
 
@@ -162,14 +165,16 @@ impl Spectra {
         }
         let tiles = bank.corners.len();
         self.log.resize(tiles * COLUMNS * SIZE, 0.0);
+        let window: f32 = bank.window.iter().map(|w| w * w).sum();
+        let floor = (LEAST_NOISE * window).powi(2) + 1e-12;
         for t in 0..tiles {
-            self.transform(bank, t);
+            self.transform(bank, t, floor);
         }
         self.whiten(bank);
     }
 
-    /// Logarithm of the power of tile `t`.
-    fn transform(&mut self, bank: &Bank, t: usize) {
+    /// Logarithm of the power of tile `t`, and of the `floor` added to it.
+    fn transform(&mut self, bank: &Bank, t: usize, floor: f32) {
         let (l, [x, y]) = (bank.length, bank.corners[t]);
         let (mut sum, mut weight) = (0.0f64, 0.0f64);
         for v in 0..l {
@@ -200,7 +205,7 @@ impl Spectra {
             // Rows from fy = -1/2 on.
             let (positive, negative) = column.split_at(SIZE / 2);
             for (o, c) in out.iter_mut().zip(negative.iter().chain(positive)) {
-                *o = log2_rough(c.norm_sqr() + 1e-12);
+                *o = log2_rough(c.norm_sqr() + floor);
             }
         }
     }
