@@ -4,7 +4,7 @@
 //! cargo run --release --no-default-features --example embed
 //! ```
 //!
-//! In a vehicle's `Cargo.toml`: `netpose = { version = "...", default-features = false }`.
+//! In a vehicle's `Cargo.toml`: `netpose = { path = "...", default-features = false }`.
 
 use netpose::{Camera, Config, GrayView, Lens, Mesh, Status, Tracker};
 
