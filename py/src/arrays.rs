@@ -8,36 +8,46 @@ use numpy::{
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::camera::value_error;
+use crate::camera::of_argument;
 
-/// An image argument: grey, borrowed without a copy when its rows are contiguous; colour is turned to grey.
-pub enum GrayArgument<'py> {
-    /// `(H, W)`, rows contiguous and without gaps: read where it is.
+/// An image argument: grey, borrowed without a copy when the array is C-contiguous; colour is turned to grey.
+pub struct GrayArgument<'py> {
+    /// The argument's name, for errors.
+    name: &'static str,
+    pixels: Pixels<'py>,
+}
+
+enum Pixels<'py> {
+    /// `(H, W)`, C-contiguous: read where it is.
     Borrowed(PyReadonlyArray2<'py, u8>),
     /// Converted from colour, or packed from an array with other strides.
     Converted(Image<u8>),
 }
 
-impl GrayArgument<'_> {
+impl<'py> GrayArgument<'py> {
+    /// Takes the argument of this name.
+    pub fn new(name: &'static str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        Ok(Self { name, pixels: Pixels::new(name, object)? })
+    }
+
     /// The picture.
     pub fn view(&self) -> PyResult<GrayView<'_>> {
-        let view = match self {
-            Self::Borrowed(array) => {
+        let view = match &self.pixels {
+            Pixels::Borrowed(array) => {
                 let [height, width] = [array.shape()[0], array.shape()[1]];
-                GrayView::packed(array.as_slice().map_err(value_error)?, width, height)
+                GrayView::packed(array.as_slice().map_err(|e| of_argument(self.name, e))?, width, height)
             }
-            Self::Converted(image) => GrayView::packed(image.data(), image.width(), image.height()),
+            Pixels::Converted(image) => GrayView::packed(image.data(), image.width(), image.height()),
         };
-        view.map_err(value_error)
+        view.map_err(|e| of_argument(self.name, e))
     }
 }
 
-impl<'py> FromPyObject<'_, 'py> for GrayArgument<'py> {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+impl<'py> Pixels<'py> {
+    fn new(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(gray) = object.extract::<PyReadonlyArray2<'py, u8>>() {
-            if gray.as_slice().is_ok() {
+            // Fortran order is contiguous too, but by columns.
+            if gray.is_c_contiguous() {
                 return Ok(Self::Borrowed(gray));
             }
             let array = gray.as_array();
@@ -58,16 +68,28 @@ impl<'py> FromPyObject<'_, 'py> for GrayArgument<'py> {
                     }
                 };
                 let mut gray = Image::default();
-                grey_from_colour(bytes, width, height, 3 * width, ColourLayout::Rgb, &mut gray).map_err(value_error)?;
+                grey_from_colour(bytes, width, height, 3 * width, ColourLayout::Rgb, &mut gray)
+                    .map_err(|e| of_argument(name, e))?;
                 return Ok(Self::Converted(gray));
             }
         }
-        let got = match object.cast::<PyUntypedArray>() {
-            Ok(array) => format!("{} of shape {:?}", array.dtype().str()?, array.shape()),
-            Err(_) => object.get_type().to_string(),
-        };
-        Err(PyTypeError::new_err(format!("expected a numpy array, uint8 of shape (H, W) or (H, W, 3) RGB, got {got}")))
+        Err(wrong_type(name, "uint8 of shape (H, W) or (H, W, 3) RGB", object))
     }
+}
+
+/// A float64 array of two dimensions; `shape` says which, for the error.
+pub fn float_array<'py>(name: &str, shape: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    object.extract().map_err(|_| wrong_type(name, &format!("float64 of shape {shape}"), object))
+}
+
+fn wrong_type(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyErr {
+    let described = object.cast::<PyUntypedArray>().map_err(PyErr::from).and_then(|array| {
+        let shape: Vec<String> = array.shape().iter().map(usize::to_string).collect();
+        let comma = if shape.len() == 1 { "," } else { "" };
+        Ok(format!("{} of shape ({}{comma})", array.dtype().str()?, shape.join(", ")))
+    });
+    let got = described.unwrap_or_else(|_| object.get_type().to_string());
+    PyTypeError::new_err(format!("{name}: expected a numpy array, {expected}, got {got}"))
 }
 
 /// `rows * columns` values as an array of that shape.

@@ -11,6 +11,11 @@ pub fn value_error(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
+/// Errors of an argument say its name first.
+pub fn of_argument(name: &str, error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(format!("{name}: {error}"))
+}
+
 /// A calibrated camera.
 #[pyclass(frozen, module = "netpose_rs")]
 #[derive(Debug, Clone)]
@@ -41,6 +46,17 @@ impl Camera {
     #[staticmethod]
     fn from_yaml(path: PathBuf) -> PyResult<Self> {
         Ok(Self { inner: net_log::read_camera(&path).map_err(value_error)? })
+    }
+
+    /// Coefficients of the lens in OpenCV's order; none for a pinhole.
+    #[getter]
+    fn distortion(&self) -> Vec<f64> {
+        self.inner.lens().coefficients().to_vec()
+    }
+    /// Name of the lens model, as in ROS.
+    #[getter]
+    fn model(&self) -> &'static str {
+        self.inner.lens().model()
     }
 
     #[getter]

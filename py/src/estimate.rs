@@ -12,6 +12,8 @@ pub struct Estimate {
     status: &'static str,
     #[pyo3(get)]
     probability: f64,
+    #[pyo3(get)]
+    track: u32,
     net: Option<netpose::NetPose>,
     junctions: Vec<netpose::Junction>,
 }
@@ -22,6 +24,7 @@ impl Estimate {
         Self {
             status: estimate.status.as_str(),
             probability: estimate.probability,
+            track: estimate.track,
             net: estimate.net,
             junctions: estimate.junctions.to_vec(),
         }
@@ -59,6 +62,26 @@ impl Estimate {
     fn lattice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
         let rows: Vec<i64> = self.junctions.iter().flat_map(index_or_unnamed).collect();
         array2(py, rows, self.junctions.len(), 2)
+    }
+    #[getter]
+    fn sigma_range_m(&self) -> Option<f64> {
+        self.net.map(|n| n.sigma_range_m)
+    }
+    #[getter]
+    fn sigma_tilt(&self) -> Option<f64> {
+        self.net.map(|n| n.sigma_tilt)
+    }
+    #[getter]
+    fn sigma_xy_m(&self) -> Option<f64> {
+        self.net.map(|n| n.sigma_xy_m)
+    }
+    #[getter]
+    fn crossing_angle(&self) -> Option<f64> {
+        self.net?.sheet.map(|s| s.crossing_angle)
+    }
+    #[getter]
+    fn curvatures_per_m(&self) -> Option<(f64, f64)> {
+        self.net?.sheet.map(|s| s.curvatures_per_m.into())
     }
     fn __repr__(&self) -> String {
         match self.net {

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 
 use crate::arrays::GrayArgument;
-use crate::camera::{Camera, Mesh, value_error};
+use crate::camera::{Camera, Mesh, of_argument, value_error};
 use crate::estimate::Estimate;
 
 /// Follows one net through the frames of one camera.
@@ -20,10 +20,17 @@ impl Tracker {
         Ok(Self { inner: netpose::Tracker::new(camera.inner, mesh.inner, &config(method)?).map_err(value_error)? })
     }
 
-    fn update(&mut self, py: Python<'_>, image: GrayArgument<'_>, timestamp_ns: i64) -> PyResult<Estimate> {
+    fn update(&mut self, py: Python<'_>, image: &Bound<'_, PyAny>, timestamp_ns: i64) -> PyResult<Estimate> {
+        let image = GrayArgument::new("image", image)?;
         let view = image.view()?;
         let tracker = &mut self.inner;
-        py.detach(|| tracker.update(view, timestamp_ns).map(|e| Estimate::from_frame(&e))).map_err(value_error)
+        py.detach(|| tracker.update(view, timestamp_ns).map(|e| Estimate::from_frame(&e))).map_err(|error| {
+            let argument = match error {
+                netpose::Error::TimeOrder { .. } => "timestamp_ns",
+                _ => "image",
+            };
+            of_argument(argument, error)
+        })
     }
 }
 
@@ -32,7 +39,7 @@ impl Tracker {
 #[pyo3(signature = (image, camera, mesh, *, method=None))]
 pub fn estimate(
     py: Python<'_>,
-    image: GrayArgument<'_>,
+    image: &Bound<'_, PyAny>,
     camera: &Camera,
     mesh: &Mesh,
     method: Option<&str>,
@@ -43,7 +50,7 @@ pub fn estimate(
 fn config(method: Option<&str>) -> PyResult<netpose::Config> {
     let mut config = netpose::Config::default();
     if let Some(method) = method {
-        config.method = method.parse().map_err(value_error)?;
+        config.method = method.parse().map_err(|e: netpose::Error| value_error(e))?;
     }
     Ok(config)
 }

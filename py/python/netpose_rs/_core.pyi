@@ -4,9 +4,31 @@ from typing import Any, Literal, final
 import numpy as np
 import numpy.typing as npt
 
-#: uint8, (H, W) grey or (H, W, 3) RGB. Grey with contiguous rows is read in place, anything else is converted once.
-Image = npt.NDArray[np.uint8]
-Method = Literal["lattice", "thesis"]
+__all__ = [
+    "Camera",
+    "Mesh",
+    "Estimate",
+    "lattice_vectors",
+    "peaks",
+    "scores",
+    "spectrum",
+    "FlowResult",
+    "FlowTracker",
+    "Matches",
+    "match_points",
+    "Junctions",
+    "detect",
+    "SimFrame",
+    "render",
+    "scenarios",
+    "Tracker",
+    "estimate",
+]
+
+#: uint8, (H, W) grey or (H, W, 3) RGB. A C-contiguous grey array is read in place, without a copy; anything else is packed or converted
+#: to grey once. The GIL is released while it is looked at: do not write into it from another thread meanwhile.
+_Image = npt.NDArray[np.uint8]
+_Method = Literal["lattice", "thesis"]
 
 @final
 class Camera:
@@ -31,6 +53,12 @@ class Camera:
     @staticmethod
     def from_yaml(path: str | PathLike[str]) -> Camera:
         """ROS ``camera_info`` YAML or Kalibr camchain YAML. Raises ValueError that names file, field and value."""
+    @property
+    def distortion(self) -> list[float]:
+        """Coefficients of the lens, OpenCV's order; empty for a pinhole."""
+    @property
+    def model(self) -> str:
+        """Name of the lens model as in ROS; a pinhole is a ``plumb_bob`` without coefficients."""
     @property
     def fx(self) -> float: ...
     @property
@@ -93,27 +121,45 @@ class Estimate:
     @property
     def lattice(self) -> npt.NDArray[np.int64]:
         """(N, 2) lattice indices (i, j) of ``junctions``; the lowest int32 where a junction has no name."""
+    @property
+    def track(self) -> int:
+        """Number of the count of cells: grows by one each time the net was lost and the origin is another node."""
+    @property
+    def sigma_range_m(self) -> float | None:
+        """One standard deviation of the range, m."""
+    @property
+    def sigma_tilt(self) -> float | None:
+        """One standard deviation of the normal's direction, root mean square over both axes, rad."""
+    @property
+    def sigma_xy_m(self) -> float | None:
+        """One standard deviation of the place along the net, root mean square over both axes, m."""
+    @property
+    def crossing_angle(self) -> float | None:
+        """From X to the second mesh direction at the optical axis, rad. None from ``method="thesis"``."""
+    @property
+    def curvatures_per_m(self) -> tuple[float, float] | None:
+        """Principal curvatures at the optical axis, 1/m; positive bends away. None from ``method="thesis"``."""
 
 @final
 class Tracker:
     """Follows one net through the frames of one camera."""
 
-    def __new__(cls, camera: Camera, mesh: Mesh, *, method: Method | None = None) -> Tracker: ...
-    def update(self, image: Image, timestamp_ns: int) -> Estimate:
+    def __new__(cls, camera: Camera, mesh: Mesh, *, method: _Method | None = None) -> Tracker: ...
+    def update(self, image: _Image, timestamp_ns: int) -> Estimate:
         """The next frame. Raises ValueError for an image of another size than the camera's, or a time that does not come
         after the frame before; TypeError for another dtype or shape."""
 
-def estimate(image: Image, camera: Camera, mesh: Mesh, *, method: Method | None = None) -> Estimate:
+def estimate(image: _Image, camera: Camera, mesh: Mesh, *, method: _Method | None = None) -> Estimate:
     """One image, no state."""
 
 # Stages: documented in the modules fft, junction, flow and sim.
 
-def spectrum(image: Image, *, window: bool = True, logarithm: bool = True, blur: bool = True) -> npt.NDArray[np.uint8]: ...
+def spectrum(image: _Image, *, window: bool = True, logarithm: bool = True, blur: bool = True) -> npt.NDArray[np.uint8]: ...
 def peaks(
-    spectrum: Image, *, neighbourhood: int = 16, threshold: int = 20, cluster: float = 10.0
+    spectrum: _Image, *, neighbourhood: int = 16, threshold: int = 20, cluster: float = 10.0
 ) -> npt.NDArray[np.float64]: ...
 def scores(
-    spectrum: Image,
+    spectrum: _Image,
     *,
     ellipse: float = 0.25,
     constant_radius: float = 4.0,
@@ -131,7 +177,8 @@ class Junctions:
         """(N, 2) pixels (u, v)."""
     @property
     def lattice(self) -> npt.NDArray[np.int64]:
-        """(N, 2) lattice indices (i, j); the lowest int32 where a junction has no name."""
+        """(N, 2) lattice indices (i, j): the given pose's, or without one counted from some junction. The lowest int32 where
+        a junction has no name."""
     @property
     def sigma_px(self) -> npt.NDArray[np.float64]:
         """(N,) one standard deviation of the pixel, each axis."""
@@ -140,7 +187,7 @@ class Junctions:
         """(M, 4, 2) corners, px, of the meshes they were found from."""
 
 def detect(
-    image: Image, camera: Camera | None = None, mesh: Mesh | None = None, pose: npt.NDArray[np.float64] | None = None
+    image: _Image, camera: Camera | None = None, mesh: Mesh | None = None, pose: npt.NDArray[np.float64] | None = None
 ) -> Junctions: ...
 @final
 class Matches:
@@ -156,7 +203,7 @@ class Matches:
     def found(self) -> npt.NDArray[np.bool_]:
         """(N,) whether the match was found and found its way back."""
 
-def match_points(previous: Image, next: Image, points: npt.NDArray[np.float64]) -> Matches: ...
+def match_points(previous: _Image, next: _Image, points: npt.NDArray[np.float64]) -> Matches: ...
 @final
 class FlowResult:
     """What an update of the tracker tells."""
@@ -181,7 +228,7 @@ class FlowTracker:
     """Follows points through frames of one size by pyramidal block matching."""
 
     def __new__(cls, width: int, height: int) -> FlowTracker: ...
-    def update(self, image: Image) -> FlowResult: ...
+    def update(self, image: _Image) -> FlowResult: ...
 
 @final
 class SimFrame:
@@ -189,7 +236,7 @@ class SimFrame:
 
     @property
     def image(self) -> npt.NDArray[np.uint8]:
-        """(H, W)."""
+        """(H, W). One array, the same at every access."""
     @property
     def camera(self) -> Camera: ...
     @property
@@ -200,6 +247,12 @@ class SimFrame:
     def range_m(self) -> float | None: ...
     @property
     def normal(self) -> npt.NDArray[np.float64] | None: ...
+    @property
+    def crossing_angle(self) -> float | None:
+        """Angle between the mesh directions at the optical axis, rad."""
+    @property
+    def curvatures_per_m(self) -> tuple[float, float] | None:
+        """Principal curvatures at the optical axis, 1/m."""
     @property
     def pose(self) -> npt.NDArray[np.float64] | None:
         """(4, 4) net to camera; the origin is the scene's node (0, 0)."""

@@ -9,18 +9,19 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 
 use crate::arrays::{GrayArgument, array2};
-use crate::camera::value_error;
+use crate::camera::{of_argument, value_error};
 
 /// Centred log magnitude of the Hann-windowed picture, 0..255, constant bin at `(width / 2, height / 2)`.
 #[pyfunction]
 #[pyo3(signature = (image, *, window=true, logarithm=true, blur=true))]
 pub fn spectrum<'py>(
     py: Python<'py>,
-    image: GrayArgument<'py>,
+    image: &Bound<'_, PyAny>,
     window: bool,
     logarithm: bool,
     blur: bool,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let image = GrayArgument::new("image", image)?;
     let view = image.view()?;
     let drawn = py
         .detach(|| {
@@ -42,11 +43,12 @@ pub fn spectrum<'py>(
 #[pyo3(signature = (spectrum, *, neighbourhood=16, threshold=20, cluster=10.0))]
 pub fn peaks<'py>(
     py: Python<'py>,
-    spectrum: GrayArgument<'py>,
+    spectrum: &Bound<'_, PyAny>,
     neighbourhood: usize,
     threshold: u8,
     cluster: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let spectrum = GrayArgument::new("spectrum", spectrum)?;
     let view = spectrum.view()?;
     let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
     config.validate().map_err(value_error)?;
@@ -63,16 +65,23 @@ pub fn peaks<'py>(
 #[pyo3(signature = (spectrum, *, ellipse=0.25, constant_radius=4.0, neighbourhood=16, threshold=20, cluster=10.0))]
 pub fn scores<'py>(
     py: Python<'py>,
-    spectrum: GrayArgument<'py>,
+    spectrum: &Bound<'_, PyAny>,
     ellipse: f64,
     constant_radius: f64,
     neighbourhood: usize,
     threshold: u8,
     cluster: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let spectrum = GrayArgument::new("spectrum", spectrum)?;
     let view = spectrum.view()?;
     let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
     config.validate().map_err(value_error)?;
+    if !(ellipse > 0.0 && ellipse.is_finite()) {
+        return Err(of_argument("ellipse", format!("{ellipse} is not a share of the spectrum above 0")));
+    }
+    if !(constant_radius >= 0.0 && constant_radius.is_finite()) {
+        return Err(of_argument("constant_radius", format!("{constant_radius} is not a number of bins, 0 or more")));
+    }
     let rows: Vec<f64> = py.detach(|| {
         let (width, height) = (view.width(), view.height());
         let middle = (width / 2, height / 2);
@@ -93,7 +102,11 @@ pub fn scores<'py>(
 /// Lattice vectors, px, rows, of two wave vectors, cycles per pixel: the inverse transpose.
 #[pyfunction]
 pub fn lattice_vectors<'py>(py: Python<'py>, k1: (f64, f64), k2: (f64, f64)) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let vector = |k: (f64, f64)| Vector2::new(k.0, k.1);
-    let b = net_geometry::Basis::from_wave_vectors(vector(k1), vector(k2)).map_err(value_error)?;
+    let vector = |name: &str, k: (f64, f64)| {
+        let finite = k.0.is_finite() && k.1.is_finite();
+        finite.then(|| Vector2::new(k.0, k.1)).ok_or_else(|| of_argument(name, format!("{k:?} is not a wave vector")))
+    };
+    let b = net_geometry::Basis::from_wave_vectors(vector("k1", k1)?, vector("k2", k2)?);
+    let b = b.map_err(|e| of_argument("k1, k2", e))?;
     array2(py, vec![b.b1.x, b.b1.y, b.b2.x, b.b2.y], 2, 2)
 }

@@ -1,11 +1,11 @@
 //! `netpose_rs.flow`
 
 use net_flow::{Config, FlowTracker as Inner, Guess, Hints, MatchConfig, MatchState, Status};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::GrayArgument;
-use crate::camera::value_error;
+use crate::camera::{of_argument, value_error};
 use crate::estimate::matrix;
 use crate::stages::{pixels, read_pixels};
 
@@ -35,15 +35,16 @@ impl Matches {
 #[pyfunction]
 pub fn match_points(
     py: Python<'_>,
-    previous: GrayArgument<'_>,
-    next: GrayArgument<'_>,
-    points: PyReadonlyArray2<'_, f64>,
+    previous: &Bound<'_, PyAny>,
+    next: &Bound<'_, PyAny>,
+    points: &Bound<'_, PyAny>,
 ) -> PyResult<Matches> {
+    let (previous, next) = (GrayArgument::new("previous", previous)?, GrayArgument::new("next", next)?);
     let (previous, next) = (previous.view()?, next.view()?);
-    let points = read_pixels("points", &points)?;
+    let points = read_pixels("points", points)?;
     py.detach(|| net_flow::match_points(previous, next, &points, Guess::Still, &MatchConfig::default()))
         .map(|matches| Matches { matches })
-        .map_err(value_error)
+        .map_err(|e| of_argument("next", e))
 }
 
 /// What an update of the tracker tells.
@@ -84,7 +85,8 @@ impl FlowTracker {
         Ok(Self { inner: Inner::new(width, height, &Config::default()).map_err(value_error)? })
     }
 
-    fn update(&mut self, py: Python<'_>, image: GrayArgument<'_>) -> PyResult<FlowResult> {
+    fn update(&mut self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<FlowResult> {
+        let image = GrayArgument::new("image", image)?;
         let view = image.view()?;
         let tracker = &mut self.inner;
         py.detach(|| {
@@ -102,6 +104,6 @@ impl FlowTracker {
                 from_key: result.from_key,
             })
         })
-        .map_err(|error: net_flow::Error| value_error(error))
+        .map_err(|error: net_flow::Error| of_argument("image", error))
     }
 }

@@ -3,12 +3,12 @@
 use net_geometry::Pose;
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 use net_junction::{Config, Expectation, ExpectedNet, JunctionDetector};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{GrayArgument, array2};
-use crate::camera::{Camera, Mesh, value_error};
+use crate::arrays::{GrayArgument, array2, float_array};
+use crate::camera::{Camera, Mesh, of_argument};
 use crate::estimate::index_or_unnamed;
 use crate::stages::pixels;
 
@@ -45,16 +45,17 @@ impl Junctions {
 #[pyo3(signature = (image, camera=None, mesh=None, pose=None))]
 pub fn detect(
     py: Python<'_>,
-    image: GrayArgument<'_>,
+    image: &Bound<'_, PyAny>,
     camera: Option<&Camera>,
     mesh: Option<&Mesh>,
-    pose: Option<PyReadonlyArray2<'_, f64>>,
+    pose: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Junctions> {
+    let image = GrayArgument::new("image", image)?;
     let view = image.view()?;
     let expectation = match (camera, mesh, pose) {
         (None, None, None) => None,
         (Some(camera), Some(mesh), Some(pose)) => {
-            let pose = read_pose(&pose)?;
+            let pose = read_pose(pose)?;
             Some(Expectation::Net(ExpectedNet { camera: camera.inner, mesh: mesh.inner, pose, anchored: true }))
         }
         _ => return Err(PyValueError::new_err("camera, mesh and pose go together: give all three or none")),
@@ -65,10 +66,11 @@ pub fn detect(
         let boxes = detector.boxes().flat_map(|b| b.corners).flat_map(|p| [p.x, p.y]).collect();
         Ok(Junctions { junctions, boxes })
     })
-    .map_err(|error: net_junction::Error| value_error(error))
+    .map_err(|error: net_junction::Error| of_argument("image", error))
 }
 
-fn read_pose(pose: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
+fn read_pose(pose: &Bound<'_, PyAny>) -> PyResult<Pose> {
+    let pose = float_array("pose", "(4, 4)", pose)?;
     let m = pose.as_array();
     if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
         return Err(PyValueError::new_err(format!(

@@ -6,11 +6,11 @@ pub mod junction;
 pub mod sim;
 
 use net_geometry::nalgebra::Vector2;
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::array2;
+use crate::arrays::{array2, float_array};
 
 /// `(N, 2)` pixels.
 pub fn pixels<'py>(py: Python<'py>, points: impl Iterator<Item = Vector2<f64>>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -20,7 +20,8 @@ pub fn pixels<'py>(py: Python<'py>, points: impl Iterator<Item = Vector2<f64>>) 
 }
 
 /// Reads `(N, 2)` pixels; `name` is the argument's, for the error.
-pub fn read_pixels(name: &str, points: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vector2<f64>>> {
+pub fn read_pixels(name: &str, points: &Bound<'_, PyAny>) -> PyResult<Vec<Vector2<f64>>> {
+    let points = float_array(name, "(N, 2)", points)?;
     let points = points.as_array();
     if points.ncols() != 2 {
         return Err(PyValueError::new_err(format!("{name}: expected shape (N, 2), got {:?}", points.shape())));

@@ -5,14 +5,14 @@ use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::array2;
-use crate::camera::{Camera, Mesh, value_error};
+use crate::camera::{Camera, Mesh, of_argument, value_error};
 use crate::estimate::matrix;
 use crate::stages::pixels;
 
 /// A simulated frame with its truth.
 #[pyclass(frozen, module = "netpose_rs.sim")]
 pub struct SimFrame {
-    image: Image<u8>,
+    image: Py<PyArray2<u8>>,
     truth: net_sim::Truth,
     camera: net_geometry::Camera,
     mesh: net_geometry::Mesh,
@@ -24,8 +24,8 @@ pub struct SimFrame {
 #[pymethods]
 impl SimFrame {
     #[getter]
-    fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        array2(py, self.image.data().to_vec(), self.image.height(), self.image.width())
+    fn image<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u8>> {
+        self.image.bind(py).clone()
     }
     #[getter]
     fn camera(&self) -> Camera {
@@ -42,6 +42,14 @@ impl SimFrame {
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.truth.layers.first()?.axis.as_ref().map(|a| a.normal.as_slice().to_pyarray(py))
+    }
+    #[getter]
+    fn crossing_angle(&self) -> Option<f64> {
+        self.truth.layers.first()?.axis.as_ref().map(|a| a.crossing_angle)
+    }
+    #[getter]
+    fn curvatures_per_m(&self) -> Option<(f64, f64)> {
+        self.truth.layers.first()?.axis.as_ref().map(|a| a.curvatures_per_m.into())
     }
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
@@ -76,14 +84,16 @@ pub fn scenarios() -> Vec<(String, String)> {
 #[pyfunction]
 #[pyo3(signature = (scenario, frame=0, seed=None))]
 pub fn render(py: Python<'_>, scenario: &str, frame: u32, seed: Option<u64>) -> PyResult<SimFrame> {
-    let mut scenario = Scenario::by_name(scenario).map_err(value_error)?;
+    let mut scenario = Scenario::by_name(scenario).map_err(|e| of_argument("scenario", e))?;
     scenario.seed = seed.unwrap_or(scenario.seed);
-    py.detach(|| {
-        let camera = scenario.camera()?;
+    let drawn = py.detach(|| {
+        let (camera, mesh) = (scenario.camera()?, scenario.mesh()?);
         let frame = scenario.frame(frame)?;
         let mut image = Image::default();
         let truth = Simulator::new(camera).render(&frame.scene, frame.seed, &mut image)?.clone();
-        Ok(SimFrame { image, truth, camera, mesh: scenario.mesh()?, timestamp_ns: frame.timestamp_ns })
-    })
-    .map_err(|error: net_sim::Error| value_error(error))
+        Ok((camera, mesh, frame.timestamp_ns, truth, image))
+    });
+    let (camera, mesh, timestamp_ns, truth, image) = drawn.map_err(|error: net_sim::Error| value_error(error))?;
+    let image = array2(py, image.data().to_vec(), image.height(), image.width())?.unbind();
+    Ok(SimFrame { image, truth, camera, mesh, timestamp_ns })
 }

@@ -1,0 +1,120 @@
+"""Estimates of the whole program against the simulator's truth."""
+
+import numpy as np
+import pytest
+
+import netpose_rs as npr
+
+#: Range of the lattice estimator on a clean simulated net: its median is below 0.01 %, this is a wide margin for one picture.
+RANGE_REL = 0.002
+#: Angle between estimated and true normal, degrees, likewise.
+NORMAL_DEG = 0.5
+#: Place along the net modulo a cell, m: a fiftieth of a cell.
+PLACE_M = 0.001
+#: A knot is listed within this of its true place, px: the picture is 0.7 px sharp, and knots of the plain net are exact.
+KNOT_PX = 0.7
+#: Knots this near to the rim need not be listed: what they are found by is partly outside.
+RIM_PX = 20.0
+
+
+def turned(pose: np.ndarray, quarters: int) -> np.ndarray:
+    """The pose of the same square net, its directions named otherwise."""
+    cos, sin = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters]
+    turn = np.eye(4)
+    turn[:2, :2] = [[cos, -sin], [sin, cos]]
+    return pose @ turn
+
+
+def against_truth(result: npr.Estimate, truth: npr.sim.SimFrame) -> tuple[float, float]:
+    """Angle (rad) between the poses and distance (m) between the origins, modulo the ways to name directions and nodes."""
+    assert result.pose is not None and truth.pose is not None
+    cell = truth.mesh.sides[0]
+    found = []
+    for quarters in range(4):
+        pose = turned(truth.pose, quarters)
+        relative = np.linalg.inv(pose) @ result.pose
+        angle = np.arccos(np.clip((np.trace(relative[:3, :3]) - 1) / 2, -1, 1))
+        place = relative[:3, 3]
+        place[:2] -= cell * np.round(place[:2] / cell)
+        found.append((float(angle), float(np.linalg.norm(place))))
+    return min(found)
+
+
+@pytest.fixture(scope="module")
+def result(plain: npr.sim.SimFrame) -> npr.Estimate:
+    return npr.estimate(plain.image, plain.camera, plain.mesh)
+
+
+def test_a_single_picture_gives_the_pose(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
+    assert result.status == "ok" and 0.5 <= result.probability <= 1.0
+    assert plain.range_m is not None and result.range_m is not None
+    assert result.range_m == pytest.approx(plain.range_m, rel=RANGE_REL)
+    assert result.normal is not None and plain.normal is not None
+    assert np.degrees(np.arccos(min(1.0, float(result.normal @ plain.normal)))) < NORMAL_DEG
+    assert result.distance_m == pytest.approx(result.range_m * result.normal[2])
+    angle, place = against_truth(result, plain)
+    assert np.degrees(angle) < NORMAL_DEG and place < PLACE_M + RANGE_REL * plain.range_m
+    assert result.crossing_angle == pytest.approx(np.pi / 2, abs=np.radians(NORMAL_DEG))
+
+
+def test_a_pose_is_a_rotation_and_a_translation_with_a_covariance(result: npr.Estimate) -> None:
+    pose, covariance = result.pose, result.covariance
+    assert pose is not None and covariance is not None and result.normal is not None
+    assert pose.shape == (4, 4) and covariance.shape == (6, 6)
+    assert pose[:3, :3] @ pose[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
+    assert np.linalg.det(pose[:3, :3]) == pytest.approx(1)
+    assert np.array_equal(pose[3], [0, 0, 0, 1])
+    assert pose[:3, 2] == pytest.approx(result.normal)
+    assert covariance == pytest.approx(covariance.T)
+    assert np.linalg.eigvalsh(covariance).min() > 0
+    assert result.sigma_range_m is not None and 0 < result.sigma_range_m < 0.01
+    assert result.sigma_tilt is not None and 0 < result.sigma_tilt < 0.02
+    assert result.sigma_xy_m is not None and 0 < result.sigma_xy_m < 0.01
+
+
+def test_junctions_are_the_knots_by_name(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
+    found, names = result.junctions, result.lattice
+    offsets = np.linalg.norm(found[:, None] - plain.nodes[None], axis=2)
+    nearest = offsets.argmin(axis=1)
+    assert offsets.min(axis=1).max() < KNOT_PX
+    height, width = plain.image.shape
+    u, v = plain.nodes.T
+    inner = (u > RIM_PX) & (v > RIM_PX) & (u < width - RIM_PX) & (v < height - RIM_PX)
+    assert np.isin(np.flatnonzero(inner), nearest).mean() > 0.99
+    # One and the same turn and shift takes the names given to the true ones.
+    rows = np.column_stack([names, np.ones(len(names))])
+    named, *_ = np.linalg.lstsq(rows, plain.lattice[nearest].astype(float), rcond=None)
+    assert rows @ named == pytest.approx(plain.lattice[nearest], abs=1e-6)
+    assert named == pytest.approx(np.round(named), abs=1e-6)
+    assert abs(np.linalg.det(named[:2])) == pytest.approx(1)
+
+
+def test_the_thesis_method_is_there_too(plain: npr.sim.SimFrame) -> None:
+    result = npr.estimate(plain.image, plain.camera, plain.mesh, method="thesis")
+    # 5 % is what its tables reach; it may refuse.
+    if result.status == "ok":
+        assert result.range_m == pytest.approx(plain.range_m, rel=0.05)
+    assert result.crossing_angle is None and result.curvatures_per_m is None
+
+
+def test_a_tracker_counts_cells() -> None:
+    frames = [npr.sim.render("strafe", k) for k in range(4)]
+    tracker = npr.Tracker(frames[0].camera, frames[0].mesh)
+    results = [tracker.update(f.image, f.timestamp_ns) for f in frames]
+    assert [r.status for r in results] == ["ok"] * 4
+    assert len({r.track for r in results}) == 1
+    first, last = results[0].pose, results[-1].pose
+    true_first, true_last = frames[0].pose, frames[-1].pose
+    assert first is not None and last is not None and true_first is not None and true_last is not None
+    # The camera's way in its own first frame: whole cells would show, they are 50 mm.
+    way, true_way = (a[:3, 3] - b[:3, 3] for a, b in ((last, first), (true_last, true_first)))
+    assert way == pytest.approx(true_way, abs=0.005)
+
+
+def test_the_same_picture_gives_the_same_answer(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
+    again = npr.estimate(plain.image, plain.camera, plain.mesh)
+    assert again.probability == result.probability
+    assert again.pose is not None and result.pose is not None and np.array_equal(again.pose, result.pose)
+    assert np.array_equal(again.junctions, result.junctions)
+    colour = npr.estimate(np.repeat(plain.image[..., None], 3, axis=2), plain.camera, plain.mesh)
+    assert colour.pose is not None and np.array_equal(colour.pose, result.pose)
