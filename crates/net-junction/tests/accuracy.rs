@@ -1,6 +1,6 @@
 //! Junctions against the truth of drawn nets.
 
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used)] // shared by tests
 
 mod scene;
 

@@ -1,6 +1,6 @@
 //! Pictures without a net give no junctions, and bad input is an error or nothing, never a panic.
 
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used)] // shared by tests
 
 mod scene;
 

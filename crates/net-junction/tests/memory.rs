@@ -1,6 +1,6 @@
 //! No memory is allocated per frame once the buffers have grown, and the same input gives the same output.
 
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used)] // shared by tests
 
 mod scene;
 

@@ -212,8 +212,9 @@ impl Log {
             (time.abs_diff(first)) as f64 / last.abs_diff(first).max(1) as f64
         };
         let part = (share(to, last) - share(from, first)).max(0.0);
-        // Without bounds the number is exact.
-        let frames = |n: u64| if from.is_none() && to.is_none() { n } else { (n as f64 * part).round() as u64 };
+        // Without bounds the number is exact. Between them lie so many steps, and one frame more.
+        let bounded = |n: u64| (n.saturating_sub(1) as f64 * part).round() as u64 + u64::from(n > 0);
+        let frames = |n: u64| if from.is_none() && to.is_none() { n } else { bounded(n) };
         self.info.frames.map(|n| frames(n).div_ceil(stride.get()))
     }
 

@@ -277,6 +277,23 @@ fn logs_that_are_written_read_back() {
     }
 }
 
+/// The trajectory lost its lines and poses.csv did not: they are made anew from it, to the last digit.
+#[test]
+fn a_trajectory_is_made_anew_from_the_poses() {
+    let (whole, torn) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for dir in [&whole, &torn] {
+        write(&mut RunFiles::create(dir.path(), &[]).unwrap(), 0..60);
+    }
+    let trajectory = |dir: &Path| std::fs::read(dir.join("trajectory.tum")).unwrap();
+    std::fs::write(torn.path().join("trajectory.tum"), b"").unwrap();
+    let (files, rows) = RunFiles::resume(torn.path(), &[]).unwrap();
+    drop(files);
+    // Their junctions were not closed: some frames are done again.
+    assert!(!rows.is_empty());
+    let lines = trajectory(torn.path());
+    assert!(!lines.is_empty() && trajectory(whole.path()).starts_with(&lines));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 

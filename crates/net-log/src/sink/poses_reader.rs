@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom, Take};
 use std::path::{Path, PathBuf};
 
 use net_geometry::Pose;
-use net_geometry::nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use net_geometry::nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 use crate::sink::poses::{COLUMNS, NetColumns, POSES_HEADER, PoseRow, RowStatus};
@@ -105,6 +105,15 @@ fn complete_length(file: &mut File) -> std::io::Result<Option<u64>> {
     Ok(None)
 }
 
+fn rotation(q: Quaternion<f64>) -> Option<Rotation3<f64>> {
+    UnitQuaternion::try_new(q, 1e-6).map(|unit| unit.to_rotation_matrix())
+}
+
+/// The pose as it will be read back, to the last bit: its way through a quaternion rounds.
+pub(crate) fn as_read_back(pose: &Pose) -> Pose {
+    Pose { rotation: rotation(pose.quaternion().into_inner()).unwrap_or(pose.rotation), ..*pose }
+}
+
 fn parse_row(record: &csv::StringRecord) -> std::result::Result<PoseRow, String> {
     let cell = |i: usize| record.get(i).ok_or_else(|| format!("{} columns of {COLUMNS}", record.len()));
     let float = |i: usize| -> std::result::Result<Option<f64>, String> {
@@ -125,7 +134,7 @@ fn parse_row(record: &csv::StringRecord) -> std::result::Result<PoseRow, String>
         let need =
             |i: usize| float(i)?.filter(|v| v.is_finite()).ok_or_else(|| format!("no number in column {}", i + 1));
         let q = Quaternion::new(need(13)?, need(14)?, need(15)?, need(16)?);
-        let rotation = UnitQuaternion::try_new(q, 1e-6).ok_or("the quaternion is zero")?.to_rotation_matrix();
+        let rotation = rotation(q).ok_or("the quaternion is zero")?;
         Some(NetColumns {
             range_m: need(5)?,
             distance_m: need(6)?,

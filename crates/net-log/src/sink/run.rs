@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::sink::annotated::AnnotatedMcap;
 use crate::sink::junctions::{JunctionsParquet, journal, read_junctions, recover};
 use crate::sink::poses::{PoseRow, PosesCsv};
-use crate::sink::poses_reader::PoseRows;
+use crate::sink::poses_reader::{PoseRows, as_read_back};
 use crate::sink::summary::replace;
 use crate::sink::trajectory::TrajectoryTum;
 
@@ -120,7 +120,8 @@ impl RunFiles {
         self.junctions.write(row.frame, junctions)?;
         self.poses.write(row)?;
         if let (Some(net), Some(time)) = (&row.net, row.timestamp_ns) {
-            self.trajectory.write(time, &net.pose)?;
+            // A resumed run may have to make this line anew from poses.csv: then, too, byte for byte.
+            self.trajectory.write(time, &as_read_back(&net.pose))?;
         }
         Ok(())
     }

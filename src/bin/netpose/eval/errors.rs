@@ -70,7 +70,10 @@ impl Alignment {
     pub fn new(estimate: &Pose, truth: &Pose, mesh: &Mesh) -> Self {
         let turn = |k: usize| Rotation3::from_axis_angle(&Vector3::z_axis(), k as f64 * std::f64::consts::FRAC_PI_2);
         // True rotation = estimated rotation * run_from_true.
-        let misfit = |run_from_true: &Rotation3<f64>| (estimate.rotation * run_from_true).angle_to(&truth.rotation);
+        // By the distance of the matrices: the angle between equal rotations is not always a number.
+        let misfit = |run_from_true: &Rotation3<f64>| {
+            ((estimate.rotation * run_from_true).matrix() - truth.rotation.matrix()).norm()
+        };
         let best = (0..4).map(turn).min_by(|a, b| misfit(a).total_cmp(&misfit(b))).unwrap_or_default();
         let true_from_run = best.inverse();
         let gap = truth.camera_in_net() - true_from_run * estimate.camera_in_net();
@@ -163,6 +166,18 @@ mod tests {
         let mut slipped = named_otherwise(&later);
         slipped.translation = slipped.transform(Vector3::new(0.05, 0.0, 0.0));
         assert!((align.position_error(&slipped, &later).norm() - 0.05).abs() < 1e-12);
+    }
+
+    /// Rotations that are equal to the last digit, in any attitude.
+    #[test]
+    fn a_run_against_itself_has_no_error() {
+        let mesh = Mesh::square(0.05).unwrap();
+        for k in 0..500 {
+            let turn = 0.003 * f64::from(k);
+            let same = pose(0.1 + turn, 0.2 - turn, [0.01 * turn, 0.02, 1.2]);
+            let mut odometry = Odometry::new(mesh);
+            assert!(odometry.update(0, &same, &same).0.norm() < 1e-12, "turn {turn}");
+        }
     }
 
     #[test]
