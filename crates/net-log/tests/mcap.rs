@@ -362,6 +362,29 @@ fn a_damaged_chunk_costs_its_own_frames_only() {
     }
 }
 
+/// A plain chunk that says its records end early: none of them is believed, and nothing overflows.
+#[test]
+fn a_chunk_whose_two_lengths_differ_is_damaged() {
+    let whole = mcap_bytes(&images(12), Style { compression: None, chunk_size: 4000, ..Style::default() });
+    let chunk = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes[1].clone();
+    for bytes in [whole.clone(), without_summary(&whole)] {
+        let mut bytes = bytes;
+        // The second byte of the inner length: behind opcode, length, two times, size, checksum and an empty name.
+        let inner = chunk.chunk_start_offset as usize + 9 + 32 + 1;
+        bytes[inner] = bytes[inner].wrapping_sub(3);
+        let (frames, damage) = read_bytes(&bytes);
+        assert!(damage[0].contains("its records do not take"), "{damage:?}");
+        assert_eq!((frames.len(), good(&frames)), (12, vec![0, 1, 2, 3, 8, 9, 10, 11]));
+    }
+}
+
+/// A file cut off behind its last chunk: the message indexes follow each chunk, and nothing points to them.
+fn without_summary(whole: &[u8]) -> Vec<u8> {
+    let summary = mcap::Summary::read(whole).unwrap().unwrap();
+    let last = summary.chunk_indexes.iter().max_by_key(|c| c.chunk_start_offset).unwrap();
+    whole[..(last.chunk_start_offset + last.chunk_length + last.message_index_length) as usize].to_vec()
+}
+
 /// Numbers of the frames that decode to the picture of their number.
 fn good(frames: &[RawFrame]) -> Vec<u64> {
     let right = |f: &&RawFrame| f.decode().is_ok_and(|p| p == picture(40, 30, f.index as usize));
@@ -396,10 +419,10 @@ fn frames_keep_their_numbers_wherever_reading_begins() {
     }
     // Chunks that are passed over are not read: damage in one of them does not show. Where it does show, the frames that are lost
     // have their numbers too, with or without a summary.
-    for (summary, first_read) in [(true, 200), (false, 0)] {
-        let style = Style { summary: true, chunk_size: 1500, ..Style::default() };
-        let chunk = mcap::Summary::read(&mcap_bytes(&entries, style)).unwrap().unwrap().chunk_indexes[5].clone();
-        let mut bytes = mcap_bytes(&entries, Style { summary, ..style });
+    let whole = mcap_bytes(&entries, Style { chunk_size: 1500, ..Style::default() });
+    let chunk = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes[5].clone();
+    for (bytes, first_read) in [(whole.clone(), 200), (without_summary(&whole), 0)] {
+        let mut bytes = bytes;
         bytes[(chunk.chunk_start_offset + chunk.chunk_length - 3) as usize] ^= 0x55;
         let (_dir, path) = file(&bytes);
         for (from, damaged) in [(0, true), (200, first_read < 200)] {

@@ -175,6 +175,14 @@ impl Records {
                 self.position += RECORD_HEADER + length;
                 self.file.seek(SeekFrom::Start(self.position))?;
             }
+            op::CHUNK if !self.lengths_agree(length)? => {
+                let start = self.position;
+                let why = format!("the chunk at byte {start} is damaged: its records do not take {length} bytes");
+                self.position += RECORD_HEADER + length.min(left);
+                self.file.seek(SeekFrom::Start(self.position))?;
+                self.damage.push(format!("{}: {why}", self.name));
+                self.tell_lost(start, &BTreeMap::new(), &why, visit)?;
+            }
             op::CHUNK => {
                 let options = LinearReaderOptions::default()
                     .with_skip_start_magic(true)
@@ -200,6 +208,23 @@ impl Records {
             _ => self.resume_behind(format!("no record at byte {}", self.position), visit)?,
         }
         Ok(())
+    }
+
+    /// Whether the two lengths that a plain chunk is told to have agree; the file is then where it was. The reader of the `mcap` crate
+    /// relies on it, and subtracts below zero where records go on behind the inner length.
+    fn lengths_agree(&mut self, length: u64) -> std::io::Result<bool> {
+        // Two times, a size and a checksum, none of them of use here; then the length of the compression's name.
+        const BEFORE: usize = 28;
+        let mut head = [0; BEFORE + 4 + 8];
+        let whole = length >= head.len() as u64 && self.file.read_exact(&mut head).is_ok();
+        self.file.seek(SeekFrom::Start(self.position + RECORD_HEADER))?;
+        // What is cut off or compressed is the reader's to judge.
+        if !whole || head[BEFORE..BEFORE + 4] != [0; 4] {
+            return Ok(true);
+        }
+        let mut inner = [0; 8];
+        inner.copy_from_slice(&head[BEFORE + 4..]);
+        Ok(u64::from_le_bytes(inner) == length - head.len() as u64)
     }
 
     /// Counts the messages of the chunk at hand by its indexes, if it ends before what is wanted. `false`, with the file where it was,
