@@ -1,5 +1,6 @@
 //! The precise way: one lattice on one sheet over the whole picture, followed from frame to frame.
 
+use net_flow::vote::{CellVote, VoteConfig, VoteResult};
 use net_flow::{FlowTracker, Hints, Motion as FlowMotion, Status};
 use net_geometry::nalgebra::Vector2;
 use net_geometry::{Camera, Junction, Mesh, Pose};
@@ -20,8 +21,11 @@ pub(crate) struct LatticeMethod {
     motion: Motion,
     track: Track,
     flow: FlowTracker,
-    /// The last frame's answer, if it was vouched for.
-    last: Option<LatticeEstimate>,
+    vote: CellVote,
+    /// The last answer that was vouched for, and when.
+    last: Option<(i64, LatticeEstimate)>,
+    /// When the frame was taken that the flow starts from, if its answer was vouched for.
+    flow_from: Option<i64>,
     adjuster: NetAdjuster,
 }
 
@@ -32,6 +36,20 @@ const COUNTED_ON_CELLS: f64 = 0.3;
 const FOLLOWED_CELLS: f64 = 0.2;
 /// Farthest, as cosine, that its normal may have turned from the predicted one: 2 degrees.
 const FOLLOWED_COSINE: f64 = 0.99939;
+
+/// Longest time over which names are carried on without a velocity.
+const LONGEST_GAP_NS: i64 = 1_000_000_000;
+
+/// How the nodes of a frame got their names.
+#[derive(Debug, Clone, Copy)]
+enum Naming {
+    /// Where they were predicted, within a fraction of a cell.
+    Sure,
+    /// The likeliest; may be off by whole cells.
+    Guess,
+    /// Nothing to go by.
+    New,
+}
 
 /// Whether a followed answer is what was predicted, nearly. One that is not may have locked half a cell aside at the rim: look anew.
 fn is_near(followed: &LatticeEstimate, predicted: &Pose) -> bool {
@@ -49,7 +67,9 @@ impl LatticeMethod {
             motion: Motion::default(),
             track: Track::default(),
             flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
+            vote: CellVote::new(&VoteConfig::default())?,
             last: None,
+            flow_from: None,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
         })
     }
@@ -62,53 +82,89 @@ impl LatticeMethod {
         junctions: &mut Vec<Junction>,
     ) -> Result<Option<Found>> {
         let step = self.flow.update(image, &Hints::default())?.step;
-        let (flow_status, flow_motion) = (step.status, step.motion);
         // A steady motion says where the lattice is to a fraction of a cell, which is what following takes.
         let predicted = self.motion.predict(timestamp_ns);
         let mut found = None;
         if let Some(pose) = &predicted {
             let followed = self.estimator.update(image, pose)?;
-            found = followed.filter(|e| e.probability >= self.threshold && is_near(e, pose));
+            let followed = followed.filter(|e| e.probability >= self.threshold && is_near(e, pose));
+            found = followed.map(|estimate| (estimate, Naming::Sure));
         }
         if found.is_none() {
-            found = self.estimator.estimate(image)?;
-            if let Some(estimate) = found.as_mut().filter(|e| e.probability >= self.threshold) {
-                let carried = match predicted {
-                    Some(pose) => Some((pose, true)),
-                    None => self.last.as_ref().zip(flow_motion).and_then(|(last, motion)| {
-                        Some((self.pose_after(last, &motion)?, flow_status == Status::Tracked))
-                    }),
-                };
-                let counted = carried.and_then(|(pose, sure)| {
-                    let (named, off) = estimate.counted_on(&pose)?;
-                    Some((named, sure && off < COUNTED_ON_CELLS))
-                });
-                match counted {
-                    Some((named, sure)) => {
-                        *estimate = named;
-                        // The likeliest count goes on, under a new number: it may be off by whole cells.
-                        if !sure {
-                            self.restart();
-                        }
-                    }
-                    None => self.restart(),
-                }
-            }
+            found = self.estimator.estimate(image)?.map(|estimate| {
+                let flow = step.motion.map(|motion| (motion, step.status == Status::Tracked));
+                self.name(estimate, timestamp_ns, predicted.as_ref(), flow)
+            });
         }
-        let Some(estimate) = found else {
-            self.last = None;
+        let Some((mut estimate, naming)) = found else {
+            self.flow_from = None;
             return Ok(None);
         };
-        let answer = Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() };
-        if estimate.probability >= self.threshold {
+        let vouched = estimate.probability >= self.threshold;
+        if vouched {
+            estimate = self.judge(image, estimate, naming);
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
             self.list_junctions(image, &estimate, junctions)?;
-            self.last = Some(estimate);
-        } else {
-            self.last = None;
+        }
+        let answer = Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() };
+        self.flow_from = vouched.then_some(timestamp_ns);
+        if vouched {
+            self.last = Some((timestamp_ns, estimate));
         }
         Ok(Some(answer))
+    }
+
+    /// Names for a sheet found anew: as predicted, else as the picture flowed, else as if nothing had moved.
+    fn name(
+        &self,
+        estimate: LatticeEstimate,
+        timestamp_ns: i64,
+        predicted: Option<&Pose>,
+        flow: Option<(FlowMotion, bool)>,
+    ) -> (LatticeEstimate, Naming) {
+        let named = |pose: &Pose, sure: bool| {
+            let (named, off) = estimate.counted_on(pose)?;
+            Some((named, if sure && off < COUNTED_ON_CELLS { Naming::Sure } else { Naming::Guess }))
+        };
+        let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
+        let by_flow = || {
+            let (then, last) = recent?;
+            let (motion, tracked) = flow.filter(|_| self.flow_from == Some(*then))?;
+            named(&self.pose_after(last, &motion)?, tracked)
+        };
+        let by_rest = || named(&recent?.1.pose, false);
+        let found = predicted.and_then(|pose| named(pose, true)).or_else(by_flow).or_else(by_rest);
+        found.unwrap_or((estimate, Naming::New))
+    }
+
+    /// What does not repeat has the last word on the count of cells; where it is silent, a guess is a new count.
+    fn judge(&mut self, image: GrayView<'_>, estimate: LatticeEstimate, naming: Naming) -> LatticeEstimate {
+        if matches!(naming, Naming::New) {
+            self.vote.reset();
+        }
+        let camera = self.estimator.camera();
+        let middle = SheetMap { estimate: &estimate, camera }.seed();
+        let vote = middle.map(|middle| {
+            self.vote.update(image, middle, |ij| estimate.pixel_from_lattice(camera, ij).map(|(pixel, _)| pixel))
+        });
+        let correction = vote.as_ref().and_then(VoteResult::correction);
+        match (naming, vote, correction) {
+            (Naming::New, ..) | (Naming::Guess, _, None) => self.restart(),
+            // Sure enough without a vote.
+            (Naming::Sure, _, None) => (),
+            // The frames before this one were numbered right, or are not in doubt.
+            (_, _, Some((0, 0))) => (),
+            (Naming::Guess, Some(vote), Some(cells)) if vote.frames == 1 && vote.dropped == 0 => {
+                return estimate.renumbered(cells);
+            }
+            // Numbers were given that now prove wrong by whole cells: those go under the old count, these under a new one.
+            (_, _, Some(cells)) => {
+                self.restart();
+                return estimate.renumbered(cells);
+            }
+        }
+        estimate
     }
 
     /// A new count. What was renamed has no velocity: the change of names would look like one.

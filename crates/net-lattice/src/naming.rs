@@ -39,4 +39,11 @@ impl LatticeEstimate {
         named.sides = sides;
         Some((named, (missing - whole).amax()))
     }
+
+    /// The same sheet with `cells` added to the names of its nodes.
+    pub fn renumbered(&self, cells: (i32, i32)) -> Self {
+        let back = Vector2::new(-f64::from(cells.0), -f64::from(cells.1));
+        let labels = Labels { origin: self.labels.sheet_from_net(back), ..self.labels };
+        Self { pose: labels.pose(&self.surface), labels, ..self.clone() }
+    }
 }
