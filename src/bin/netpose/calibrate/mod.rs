@@ -69,11 +69,15 @@ pub fn main(args: &Args) -> Result<Outcome> {
         if interrupt.is_set() {
             break;
         }
-        // In the order of the seeds, whatever the number of threads.
-        let done: Vec<Examined> = pool.install(|| {
-            let examine = |bench: &mut Bench, &(study, seed): &(Study, u64)| bench.examine(study, seed, &config);
+        // In the order of the seeds, whatever the number of threads; scenes not begun when the command is stopped are left out.
+        let done: Vec<Option<Examined>> = pool.install(|| {
+            let examine = |bench: &mut Bench, &(study, seed): &(Study, u64)| match interrupt.is_set() {
+                true => Ok(None),
+                false => bench.examine(study, seed, &config).map(Some),
+            };
             batch.par_iter().map_init(Bench::default, examine).collect::<Result<_>>()
         })?;
+        let done: Vec<Examined> = done.into_iter().flatten().collect();
         for scene in &done {
             records.write(scene)?;
             progress.step(|| format!("{} wrong claims", all.iter().chain(&done).filter(|s| s.is_lie(&config)).count()));
