@@ -1,6 +1,7 @@
 //! Writers of results, and readers of what they wrote.
 
 mod annotated;
+mod growth;
 mod image_log;
 mod junctions;
 mod poses;
@@ -11,6 +12,7 @@ mod summary;
 mod trajectory;
 
 pub use annotated::{AnnotatedMcap, DEFAULT_CAMERA_FRAME};
+pub use growth::{GrowthParquet, GrowthRow};
 pub use image_log::{CAMERA_YAML, ImageFolderWriter, ImageMcapWriter, png, write_camera_yaml};
 pub use junctions::{Junctions, JunctionsParquet, read_junctions};
 pub use poses::{NetColumns, POSES_HEADER, PoseRow, PosesCsv, Resumed, RowStatus};
