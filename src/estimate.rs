@@ -1,5 +1,6 @@
 use net_geometry::nalgebra::{Matrix6, Vector3};
 use net_geometry::{Junction, Pose};
+use net_junction::Twine;
 
 /// Whether there is a net, and a pose that can be relied on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,4 +69,6 @@ pub struct Estimate<'a> {
     pub track: u32,
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
+    /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].
+    pub twines: &'a [Twine],
 }

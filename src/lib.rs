@@ -15,4 +15,5 @@ pub use error::{Error, Result};
 pub use estimate::{Estimate, NetPose, Sheet, Status};
 pub use net_geometry::{Camera, Junction, JunctionState, Lens, Mesh, Plane, Pose};
 pub use net_image::GrayView;
+pub use net_junction::{Twine, TwineState};
 pub use tracker::Tracker;

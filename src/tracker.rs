@@ -1,3 +1,4 @@
+use net_geometry::nalgebra::Vector2;
 use net_geometry::{Camera, Junction, Mesh};
 use net_image::GrayView;
 
@@ -64,6 +65,27 @@ impl Tracker {
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
         let status = if net.is_some() { Status::Ok } else { Status::NoNet };
-        Ok(Estimate { status, probability, net, track, junctions: &self.junctions })
+        let twines = match &self.method {
+            Engine::Lattice(method) if net.is_some() => method.twines(),
+            _ => &[],
+        };
+        Ok(Estimate { status, probability, net, track, junctions: &self.junctions, twines })
+    }
+
+    /// Where a point of the lattice (fractions included) is in the last frame that had a pose: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as
+    /// it hangs, bent or sheared. `None` for what is not in front of the camera, before the first pose, and for methods without a sheet.
+    pub fn pixel_from_lattice(&self, at: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
+        match &self.method {
+            Engine::Lattice(method) => method.pixel_from_lattice(at),
+            Engine::Thesis(_) => None,
+        }
+    }
+
+    /// Lattice coordinates of what the optical axis meets in the last frame that had a pose; `None` as above.
+    pub fn lattice_at_axis(&self) -> Option<Vector2<f64>> {
+        match &self.method {
+            Engine::Lattice(method) => method.lattice_at_axis(),
+            Engine::Thesis(_) => None,
+        }
     }
 }

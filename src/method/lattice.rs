@@ -5,7 +5,7 @@ use net_flow::{FlowTracker, Hints, Motion as FlowMotion, Status};
 use net_geometry::nalgebra::Vector2;
 use net_geometry::{Camera, Junction, Mesh, Pose};
 use net_image::GrayView;
-use net_junction::{AdjustConfig, LatticeMap, NetAdjuster};
+use net_junction::{AdjustConfig, LatticeMap, NetAdjuster, Twine};
 use net_lattice::{LatticeEstimate, LatticeEstimator};
 
 use crate::error::Result;
@@ -165,6 +165,22 @@ impl LatticeMethod {
             }
         }
         estimate
+    }
+
+    /// The twines of the last frame that had a pose.
+    pub fn twines(&self) -> &[Twine] {
+        self.adjuster.twines()
+    }
+
+    /// Pixel and depth, m, of a lattice point in the last frame that had a pose.
+    pub fn pixel_from_lattice(&self, at: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
+        self.last.as_ref()?.1.pixel_from_lattice(self.estimator.camera(), at)
+    }
+
+    /// Lattice coordinates at the optical axis in the last frame that had a pose.
+    pub fn lattice_at_axis(&self) -> Option<Vector2<f64>> {
+        let camera = self.estimator.camera();
+        self.last.as_ref()?.1.lattice_from_pixel(camera, Vector2::new(camera.cx(), camera.cy()))
     }
 
     /// A new count. What was renamed has no velocity: the change of names would look like one.
