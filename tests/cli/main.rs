@@ -5,6 +5,7 @@
 mod bad_input;
 mod calibrate;
 mod folder;
+mod map;
 mod mcap;
 mod run;
 mod sim;

@@ -8,11 +8,13 @@ mod failure;
 mod image;
 mod info;
 mod interrupt;
+mod map;
 mod options;
 mod progress;
 mod reproduce;
 mod run;
 mod sim;
+mod smooth;
 mod stats;
 
 use std::process::ExitCode;
@@ -37,6 +39,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Run(run::Args),
+    Smooth(smooth::Args),
     Image(image::Args),
     Sim(sim::Args),
     Eval(eval::Args),
@@ -48,6 +51,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Run(args) => run::main(&args),
+        Command::Smooth(args) => smooth::main(&args),
         Command::Image(args) => image::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Eval(args) => eval::main(&args),

@@ -27,6 +27,11 @@ impl Canvas {
         Self { width: gray.width(), height: gray.height(), rgb }
     }
 
+    /// A picture of one colour.
+    pub fn filled(width: usize, height: usize, colour: Colour) -> Self {
+        Self { width, height, rgb: colour.repeat(width * height) }
+    }
+
     /// Width, px.
     pub fn width(&self) -> usize {
         self.width

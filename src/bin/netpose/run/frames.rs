@@ -10,10 +10,12 @@ use net_log::{Log, RawFrame};
 use netpose::{Camera, Config, Error, Mesh, NetPose, Status, Tracker};
 
 use super::ahead::in_order;
+use super::count::{self, Count};
 use super::folder::{Ended, Finished, Folder};
 use super::overlays::Overlays;
 use crate::draw::{Overlay, Shown};
 use crate::interrupt::Interrupt;
+use crate::map::NetMap;
 use crate::progress::Progress;
 
 /// What is to be done with every frame.
@@ -24,6 +26,11 @@ pub struct Job {
     pub config: Config,
     /// Threads that decode and draw.
     pub threads: usize,
+    /// Folder of the run.
+    pub out: PathBuf,
+    /// Whether the net is to be mapped, and whether cells are to be counted with care: for the map, or for the smoother.
+    pub map: bool,
+    pub count: bool,
     /// Folder for a picture of each frame, if wanted.
     pub overlay: Option<PathBuf>,
 }
@@ -53,6 +60,7 @@ pub struct Tracked {
     pub track: u32,
     pub net: Option<NetPose>,
     pub junctions: Vec<netpose::Junction>,
+    pub twines: Vec<netpose::Twine>,
     /// Time of the tracker's update alone.
     pub latency: Duration,
 }
@@ -80,6 +88,12 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
     let depth = 2 * job.threads;
     let overlay = Arc::new(Overlay { camera: job.camera, mesh: job.mesh });
     let mut overlays = job.overlay.as_deref().map(|dir| Overlays::new(dir, &pool, depth, &overlay)).transpose()?;
+    if !job.count {
+        // That of an earlier run in this folder is about other poses.
+        count::forget(&job.out)?;
+    }
+    let mut count = job.count.then(|| Count::new(&job.out)).transpose()?;
+    let mut map = job.map.then(|| NetMap::new(&job.out, job.mesh)).transpose()?;
     // No frame has shown yet that the calibration is this camera's.
     let mut size_confirmed = done.is_some();
 
@@ -96,6 +110,12 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
             folder.write(&frame, time, tracked.as_ref().map_err(String::as_str))?;
             match (&tracked, image) {
                 (Ok(tracked), Ok(image)) => {
+                    if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view())
+                        && let Some(counted) = count.update(frame.index, tracked.track, view, &tracker)?
+                        && let Some(map) = &mut map
+                    {
+                        map.add(&counted, view, &tracker, &tracked.twines)?;
+                    }
                     folder.consider(frame.index, &image, tracked);
                     if let Some(overlays) = &mut overlays {
                         overlays.draw(frame.index, image, tracked)?;
@@ -112,7 +132,12 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
     for damage in log.damage() {
         eprintln!("warning: {damage}");
     }
-    folder.finish(ended, log.damage(), &overlay)
+    let finished = folder.finish(ended, log.damage(), &overlay)?;
+    count.map_or(Ok(()), Count::finish)?;
+    if let Some(map) = map {
+        eprintln!("{}", map.finish()?);
+    }
+    Ok(finished)
 }
 
 /// One update. The inner error says why the frame does not count; the outer one ends the run.
@@ -134,6 +159,7 @@ fn track(
             net: estimate.net,
             latency: start.elapsed(),
             junctions: estimate.junctions.to_vec(),
+            twines: estimate.twines.to_vec(),
         },
         Err(Error::Geometry(why @ net_geometry::Error::ImageSize { .. })) if *size_confirmed => {
             return Ok(Err(why.to_string()));

@@ -1,6 +1,7 @@
 //! `netpose run`: a whole log through the tracker, results into a folder.
 
 mod ahead;
+mod count;
 mod examples;
 mod folder;
 mod frames;
@@ -16,6 +17,7 @@ use crate::describe::{self, times};
 use crate::failure::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::options::Setup;
+pub use count::{Counted, HEADER as COUNT_HEADER};
 use folder::{Existing, Folder};
 
 /// Where the net is, frame by frame, in a log of images.
@@ -50,6 +52,12 @@ pub struct Args {
     /// vectors
     #[arg(long)]
     overlay: bool,
+    /// Unroll the net: mosaic, coverage, holes and growth into DIR/map, DIR/holes.csv and DIR/growth.parquet
+    #[arg(long, conflicts_with = "resume")]
+    map: bool,
+    /// Smooth the poses in the end and look for slipped cells: poses_smooth.csv, slips.csv; as `netpose smooth` does
+    #[arg(long, conflicts_with = "resume")]
+    smooth: bool,
     /// Go on where an earlier run into the same folder stopped
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -74,6 +82,9 @@ pub fn main(args: &Args) -> Result<Outcome> {
         mesh,
         config,
         threads: args.threads(),
+        out: args.out.clone(),
+        map: args.map,
+        count: args.map || args.smooth,
         overlay: args.overlay.then(|| args.out.join("overlay")),
     };
     let folder =
@@ -83,6 +94,9 @@ pub fn main(args: &Args) -> Result<Outcome> {
     if finished.is_empty() {
         let length = span_ns.map_or(0.0, |(first, last)| last.abs_diff(first) as f64 * 1e-9);
         bail!("no frame of the log was read ({}); it is {length:.3} s long", args.part());
+    }
+    if args.smooth && !interrupt.is_set() {
+        println!("{}", crate::smooth::smooth_run(&args.out, Some(&args.log), &net_track::Config::default())?);
     }
     Ok(finished.outcome())
 }
