@@ -22,6 +22,8 @@ pub struct Rows {
     /// Which row each sample is.
     pub row_of: Vec<usize>,
     pub samples: Vec<Sample>,
+    /// Deviations by which the vote was sure of a sample's count during the run; `None` where it was not asked.
+    pub judged: Vec<Option<f64>>,
     /// Names of the columns behind the usual ones.
     pub appended: Vec<String>,
 }
@@ -36,7 +38,7 @@ impl Rows {
             summary.mesh.parse().with_context(|| format!("{} does not say the mesh", paths.summary().display()))?;
         let rows: Vec<PoseRow> = reader.collect::<net_log::Result<_>>()?;
         let counts = read_counts(&paths.dir.join("count.csv"))?;
-        let (mut row_of, mut samples) = (Vec::new(), Vec::<Sample>::new());
+        let (mut row_of, mut samples, mut judged) = (Vec::new(), Vec::<Sample>::new(), Vec::new());
         let column = |row: &PoseRow, name: &str| {
             let at = appended.iter().position(|a| a == name)?;
             row.appended.get(at).copied().filter(|x| x.is_finite())
@@ -64,9 +66,10 @@ impl Rows {
                 }
             });
             row_of.push(k);
+            judged.push(counted.filter(|c| c.sure).map(|c| c.z));
             samples.push(Sample { timestamp_ns, measurement, increment: None });
         }
-        Ok(Self { rows, row_of, samples, appended })
+        Ok(Self { rows, row_of, samples, judged, appended })
     }
 
     /// A value in a column behind the usual ones.
@@ -80,6 +83,7 @@ impl Rows {
 struct Count {
     stretch: u32,
     offset: (i32, i32),
+    z: f64,
     sure: bool,
 }
 
@@ -109,7 +113,8 @@ fn read_counts(path: &Path) -> Result<BTreeMap<u64, Count>> {
             let small = |k: usize| i32::try_from(cell(k)?).with_context(failed);
             let stretch = u32::try_from(cell(2)?).with_context(failed)?;
             let frame = u64::try_from(cell(0)?).with_context(failed)?;
-            Ok((frame, Count { stretch, offset: (small(3)?, small(4)?), sure: cell(7)? == 1 }))
+            let z = record.get(6).and_then(|z| z.parse().ok()).unwrap_or(f64::NAN);
+            Ok((frame, Count { stretch, offset: (small(3)?, small(4)?), z, sure: cell(7)? == 1 }))
         })
         .collect()
 }
