@@ -52,7 +52,7 @@ impl ThesisMethod {
             self.last = None;
             return Ok(estimate.map(|e| self.found(&e, e.pose)));
         };
-        let mut lattice = Lattice { pose: estimate.pose, mesh: self.mesh };
+        let mut lattice = Lattice { pose: estimate.pose, mesh: estimate.mesh };
         if let Some((_, _, last)) = &self.last {
             lattice = lattice.following(last);
         }

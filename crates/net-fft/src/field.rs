@@ -13,7 +13,13 @@ pub struct LatticeField {
     pub normal: Vector3<f64>,
     /// `G_1`, `G_2`: in the plane, cycles.
     pub duals: [Vector3<f64>; 2],
+    /// How the net bends off the plane, which is then its tangent where the optical axis meets it: `b` in the height `½ (b_0 x² + 2 b_1 x y + b_2 y²)` away from the camera, all in units of the plane's distance.
+    /// x runs along the image's u axis laid into the plane, y completes the right-handed frame. Zero of a flat net.
+    pub bend: [f64; 3],
 }
+
+/// The height of a bent net counts no farther than this part of its distance: beyond, a parabola is no net.
+const HIGHEST: f64 = 0.3;
 
 impl LatticeField {
     /// The one field with the wave vectors `ideal` (cycles per unit of x and y) along `ray` on a plane of the given normal.
@@ -24,7 +30,7 @@ impl LatticeField {
             let gradient = Vector3::new(q.x, q.y, -q.dot(&ray.xy()));
             (gradient - normal * normal.dot(&gradient)) * along
         });
-        Self { normal, duals }
+        Self { normal, duals, bend: [0.0; 3] }
     }
 
     /// The field of `mesh` at `distance` m with the given net axes.
@@ -33,6 +39,11 @@ impl LatticeField {
         let per_area = distance / a1.perp(&a2);
         let in_camera = |x: f64, y: f64| camera_from_net * (Vector3::new(x, y, 0.0) * per_area);
         Self { normal: camera_from_net * Vector3::z(), duals: [in_camera(a2.y, -a2.x), in_camera(-a1.y, a1.x)] }
+    }
+
+    /// The same with all wave vectors times `factor`: of a net of the same mesh that many times as far.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { duals: self.duals.map(|dual| dual * factor), ..*self }
     }
 
     /// Both wave vectors along `ray`, cycles per unit of x and y. `None` where the ray does not meet the plane, or grazes it.
@@ -44,7 +55,52 @@ impl LatticeField {
             return None;
         }
         let scale = 1.0 / (along * along);
-        Some(self.duals.map(|dual| (dual.xy() * along - self.normal.xy() * dual.dot(&ray)) * scale))
+        let gradient = |v: &Vector3<f64>| (v.xy() * along - self.normal.xy() * v.dot(&ray)) * scale;
+        let waves = self.duals.map(|dual| gradient(&dual));
+        if self.bend == [0.0; 3] {
+            return Some(waves);
+        }
+        // Of φ (1 + η): the height η, in distances, moves the point along the ray.
+        let (axes, [x, y], height) = self.height(ray);
+        let [b0, b1, b2] = self.bend;
+        let slope = if height.abs() < HIGHEST {
+            gradient(&axes[0]) * (b0 * x + b1 * y) + gradient(&axes[1]) * (b1 * x + b2 * y)
+        } else {
+            Vector2::zeros()
+        };
+        let phases = self.duals.map(|dual| dual.dot(&ray) / along);
+        Some([waves[0] * (1.0 + height) + slope * phases[0], waves[1] * (1.0 + height) + slope * phases[1]])
+    }
+
+    /// Phases of both families along `ray`, cycles, up to a constant.
+    #[inline]
+    pub fn phases(&self, ray: Vector3<f64>) -> [f64; 2] {
+        let mut depth = 1.0 / self.normal.dot(&ray);
+        if self.bend != [0.0; 3] {
+            depth *= 1.0 + self.height(ray).2;
+        }
+        [self.duals[0].dot(&ray) * depth, self.duals[1].dot(&ray) * depth]
+    }
+
+    /// Axes of the bend, where along them the ray meets the plane (from where the optical axis does), and the height there; in distances.
+    #[inline]
+    fn height(&self, ray: Vector3<f64>) -> ([Vector3<f64>; 2], [f64; 2], f64) {
+        let n = self.normal;
+        let x_axis = (Vector3::x() - n * n.x).normalize();
+        let y_axis = n.cross(&x_axis);
+        let point = ray / n.dot(&ray) - Vector3::z() / n.z;
+        let (x, y) = (x_axis.dot(&point), y_axis.dot(&point));
+        let [b0, b1, b2] = self.bend;
+        let height = 0.5 * (b0 * x * x + b2 * y * y) + b1 * x * y;
+        ([x_axis, y_axis], [x, y], height.clamp(-HIGHEST, HIGHEST))
+    }
+
+    /// Curvatures, 1/m, along the two directions in which the net bends most and least (largest magnitude first), positive away from the camera.
+    pub fn curvatures(&self, mesh: &Mesh) -> [f64; 2] {
+        let [b0, b1, b2] = self.bend;
+        let (mean, half) = (0.5 * (b0 + b2), (0.5 * (b0 - b2)).hypot(b1));
+        let (a, b) = if mean < 0.0 { (mean - half, mean + half) } else { (mean + half, mean - half) };
+        [a, b].map(|bend| bend / self.distance(mesh))
     }
 
     /// Ratio of the first lattice side to the second, and the angle between them, rad.
@@ -86,6 +142,30 @@ impl LatticeField {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_bent_net_has_the_gradient_of_its_phases_and_the_radius_of_its_sphere() {
+        let mesh = Mesh::square(0.05).unwrap();
+        let mut field = LatticeField::of_mesh(&mesh, &rotation(0.5, 1.0, 0.2), 2.0);
+        field.bend = [0.3, -0.2, 0.4];
+        for (x, y) in [(0.1, 0.2), (-0.3, 0.1), (0.4, -0.2)] {
+            let phase = |x: f64, y: f64| field.phases(Vector3::new(x, y, 1.0));
+            let waves = field.waves(Vector3::new(x, y, 1.0)).unwrap();
+            let h = 1e-6;
+            for family in 0..2 {
+                let du = (phase(x + h, y)[family] - phase(x - h, y)[family]) / (2.0 * h);
+                let dv = (phase(x, y + h)[family] - phase(x, y - h)[family]) / (2.0 * h);
+                assert!((waves[family] - Vector2::new(du, dv)).norm() < 1e-5 * waves[family].norm());
+            }
+        }
+        // A sphere of radius 5 m seen from 2 m: depths of 2 m and its sag of x² / 10 m.
+        field = LatticeField::of_mesh(&mesh, &Rotation3::identity(), 2.0);
+        field.bend = [0.4, 0.0, 0.4];
+        assert!(field.curvatures(&mesh).iter().all(|curvature| (curvature - 0.2).abs() < 1e-12));
+        let cells = field.phases(Vector3::new(0.25, 0.0, 1.0))[0] * 0.05;
+        let sag = 0.5_f64.powi(2) / 10.0;
+        assert!((cells - 0.25 * (2.0 + sag)).abs() < 1e-9, "{cells}");
+    }
 
     fn rotation(tilt: f64, azimuth: f64, roll: f64) -> Rotation3<f64> {
         Rotation3::new(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt) * Rotation3::new(Vector3::z() * roll)

@@ -152,40 +152,45 @@ struct Levels<'a> {
 }
 
 impl Levels<'_> {
-    /// Level above the mean at the bin nearest to `bin`; that of its mirror image where the image shows only one half. `None` beyond the image.
-    fn at(&self, bin: Vector2<f64>) -> Option<f64> {
-        let index = |bin: Vector2<f64>| {
-            let u = (bin.x + self.constant_bin.0 as f64).round();
-            let v = (bin.y + self.constant_bin.1 as f64).round();
-            (u >= 0.0 && v >= 0.0).then(|| self.image.get(u as usize, v as usize)).flatten()
-        };
-        index(bin).or_else(|| index(-bin)).map(|level| f64::from(level) - self.mean)
-    }
-
-    /// Highest level above the mean within a bin of `bin`.
+    /// Highest level above the mean within a bin of `bin`, or of its mirror image where the image shows only that. `None` beyond the image.
     fn highest_near(&self, bin: Vector2<f64>) -> Option<f64> {
-        let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| Vector2::new(f64::from(x), f64::from(y))));
-        around.filter_map(|step| self.at(bin + step)).reduce(f64::max)
+        let bin = if bin.x < 0.0 { -bin } else { bin };
+        let (u, v) = (
+            bin.x.round() as isize + self.constant_bin.0 as isize,
+            bin.y.round() as isize + self.constant_bin.1 as isize,
+        );
+        if u < 1 || v < 1 || u as usize + 1 >= self.image.width() || v as usize + 1 >= self.image.height() {
+            return None;
+        }
+        let (u, v) = (u as usize, v as usize);
+        let highest = (v - 1..=v + 1).map(|v| self.image.row(v)[u - 1..=u + 1].iter().fold(0, |a, &b| a.max(b)));
+        Some(f64::from(highest.fold(0, u8::max)) - self.mean)
     }
 
     /// Mean level above the mean of a beam from beside the constant bin in the direction of `bin` to the ellipse.
     fn beam(&self, bin: Vector2<f64>, ellipse: &Ellipse, width: u32) -> f64 {
-        let length = bin.norm() / ellipse.fraction(bin);
-        let along = bin.normalize();
+        // The beam of the mirror image where the image shows only that: it has the same levels.
+        let bin = if bin.x < 0.0 { -bin } else { bin };
+        let (length, along) = (bin.norm() / ellipse.fraction(bin), bin.normalize());
         let across = Vector2::new(-along.y, along.x);
-        let (mut sum, mut count) = (0.0, 0.0);
-        let mut step = 2.0;
-        while step < length {
-            for lane in 0..width {
-                let offset = f64::from(lane) - (f64::from(width) - 1.0) / 2.0;
-                if let Some(level) = self.at(along * step + across * offset) {
-                    sum += level;
-                    count += 1.0;
+        let origin = Vector2::new(self.constant_bin.0 as f64, self.constant_bin.1 as f64);
+        let (mut sum, mut count) = (0u32, 0u32);
+        for lane in 0..width {
+            let mut at = origin + along * 2.0 + across * (f64::from(lane) - (f64::from(width) - 1.0) / 2.0);
+            for _ in 0..(length - 2.0).ceil().max(0.0) as usize {
+                // Beside the image there is nothing to see: a cast of what is negative is zero, so it is asked for here.
+                if let Some(level) = self
+                    .image
+                    .get((at.x + 0.5) as usize, (at.y + 0.5) as usize)
+                    .filter(|_| at.x >= -0.5 && at.y >= -0.5)
+                {
+                    sum += u32::from(level);
+                    count += 1;
                 }
+                at += along;
             }
-            step += 1.0;
         }
-        if count > 0.0 { sum / count } else { 0.0 }
+        if count > 0 { f64::from(sum) / f64::from(count) - self.mean } else { 0.0 }
     }
 
     /// How much higher every second, or every third, multiple of `bin` is than the rest: a lattice's own wave vectors have it the other way round.

@@ -81,6 +81,9 @@ fn fast_size_up_to(length: usize) -> usize {
     (1..=length).rev().find(|&n| is_fast(n) && (n.is_multiple_of(2) || n == 1)).unwrap_or(1)
 }
 
+/// Where within a section the wave vectors' change is followed: the part of it that the window lets through.
+pub const GRID: [f64; 5] = [-0.25, -0.125, 0.0, 0.125, 0.25];
+
 /// Where a section looks: what turns its bins into directions in the camera frame.
 ///
 /// A wave vector belongs to the section's centre. Of the lens only the Jacobian there matters: it maps wave vectors of the picture to those an ideal pinhole of
@@ -93,6 +96,8 @@ pub struct SectionView {
     pub ray: Vector3<f64>,
     /// Cycles per pixel of the whole picture for one bin, along u and v.
     pub wave_per_bin: Vector2<f64>,
+    /// Rays `(x, y, 1)` through a grid of points, row by row: those [`GRID`] parts of the section's width and height from its centre, along u and v.
+    pub grid_rays: [Vector3<f64>; GRID.len() * GRID.len()],
     /// `d(x, y) / d(u, v)` at the centre, 1 / px.
     jacobian: Matrix2<f64>,
     inverse: Matrix2<f64>,
@@ -107,17 +112,24 @@ impl SectionView {
         let centre_of =
             |start: usize, side: usize| factor * (start as f64 + (side as f64 - 1.0) / 2.0) + (factor - 1.0) / 2.0;
         let centre = Vector2::new(centre_of(corner.0, width), centre_of(corner.1, height));
-        let ray = camera.ray_from_pixel(centre)?;
-        // Central differences over a pixel: lenses bend over hundreds.
-        let step = |du: f64, dv: f64| {
-            let shift = Vector2::new(du, dv);
-            let (ahead, back) = (camera.ray_from_pixel(centre + shift)?, camera.ray_from_pixel(centre - shift)?);
-            Some((ahead / ahead.z - back / back.z).xy())
-        };
-        let jacobian = Matrix2::from_columns(&[step(0.5, 0.0)?, step(0.0, 0.5)?]);
+        let (ray, jacobian) = camera.ray_from_pixel_with_jacobian(centre)?;
         let inverse = jacobian.try_inverse()?;
+        let side = Vector2::new(width as f64 * factor, height as f64 * factor);
+        let mut grid_rays = [ray; GRID.len() * GRID.len()];
+        for (index, to) in grid_rays.iter_mut().enumerate() {
+            let part = Vector2::new(GRID[index % GRID.len()], GRID[index / GRID.len()]);
+            let ray = camera.ray_from_pixel(centre + part.component_mul(&side))?;
+            *to = ray / ray.z;
+        }
         let wave_per_bin = Vector2::new(1.0 / (width as f64 * factor), 1.0 / (height as f64 * factor));
-        Some(Self { centre, ray: ray / ray.z, wave_per_bin, jacobian, inverse })
+        Some(Self { centre, ray: ray / ray.z, wave_per_bin, grid_rays, jacobian, inverse })
+    }
+
+    /// Ray `(x, y, 1)` through the point so many widths and heights of the section from its centre, by the lens's Jacobian there.
+    #[inline]
+    pub fn ray_at(&self, part: Vector2<f64>) -> Vector3<f64> {
+        let shift = self.jacobian * part.component_div(&self.wave_per_bin);
+        self.ray + Vector3::new(shift.x, shift.y, 0.0)
     }
 
     /// Cycles per pixel of the whole picture.
@@ -132,7 +144,13 @@ impl SectionView {
         self.inverse.tr_mul(&self.wave_from_bin(bin))
     }
 
-    /// The way back.
+    /// A step of so many pixels of the whole picture, seen by that pinhole.
+    #[inline]
+    pub fn ideal_step(&self, pixels: Vector2<f64>) -> Vector2<f64> {
+        self.jacobian * pixels
+    }
+
+    /// [`Self::ideal_from_bin`] the other way.
     #[inline]
     pub fn bin_from_ideal(&self, ideal: Vector2<f64>) -> Vector2<f64> {
         self.jacobian.tr_mul(&ideal).component_div(&self.wave_per_bin)

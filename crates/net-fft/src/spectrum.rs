@@ -113,6 +113,46 @@ pub enum Bins {
     },
 }
 
+impl Bins {
+    /// First and last `kx`, first and last `ky` for a picture of `width` x `height` px, which is not empty.
+    pub(crate) fn ranges(self, width: usize, height: usize) -> [isize; 4] {
+        let (lowest_x, lowest_y) = (-(width as isize / 2), -(height as isize / 2));
+        let (highest_x, highest_y) = (lowest_x + width as isize - 1, lowest_y + height as isize - 1);
+        match self {
+            Self::All => [lowest_x, highest_x, lowest_y, highest_y],
+            Self::Half { left, right, vertical } => {
+                let cut = |n: usize| n.min(isize::MAX as usize) as isize;
+                let (left, right, vertical) = (cut(left), cut(right), cut(vertical));
+                [(-left).max(lowest_x), right.min(highest_x), (-vertical).max(lowest_y), vertical.min(highest_y)]
+            }
+        }
+    }
+}
+
+/// Calls `map` on the bins `(kx, y0), (kx, y0 + 1), ..` in one or two runs, and puts what it makes of them into `out` in that order. `y0` is not positive.
+pub(crate) fn map_column<T>(
+    spectrum: &HalfSpectrum,
+    kx: isize,
+    y0: isize,
+    out: &mut [T],
+    map: impl Fn(&[Complex32], &mut [T]),
+) {
+    // Bins ky < 0 of a column lie at its end; column -kx is column kx upside down.
+    let column = spectrum.column(kx.unsigned_abs());
+    let (upper, lower) = out.split_at_mut(-y0 as usize);
+    if kx >= 0 {
+        map(&column[(column.len() - upper.len()) % column.len()..][..upper.len()], upper);
+        map(&column[..lower.len()], lower);
+    } else {
+        map(&column[1..][..upper.len()], upper);
+        upper.reverse();
+        map(&column[..1], &mut lower[..1]);
+        let rest = lower.len() - 1;
+        map(&column[column.len() - rest..], &mut lower[1..]);
+        lower[1..].reverse();
+    }
+}
+
 /// How magnitudes become grey levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -146,21 +186,10 @@ pub struct SpectrumImage {
 impl SpectrumImage {
     /// Draws `bins` of `spectrum`.
     pub fn draw(&mut self, spectrum: &HalfSpectrum, bins: Bins, config: SpectrumImageConfig) {
-        let (width, height) = (spectrum.width() as isize, spectrum.height() as isize);
-        if width == 0 {
-            self.image.resize(0, 0);
-            return;
+        if spectrum.width() == 0 {
+            return self.image.resize(0, 0);
         }
-        let (lowest_x, lowest_y) = (-(width / 2), -(height / 2));
-        let (highest_x, highest_y) = (lowest_x + width - 1, lowest_y + height - 1);
-        let (x0, x1, y0, y1) = match bins {
-            Bins::All => (lowest_x, highest_x, lowest_y, highest_y),
-            Bins::Half { left, right, vertical } => {
-                let cut = |n: usize| n.min(isize::MAX as usize) as isize;
-                let (left, right, vertical) = (cut(left), cut(right), cut(vertical));
-                ((-left).max(lowest_x), right.min(highest_x), (-vertical).max(lowest_y), vertical.min(highest_y))
-            }
-        };
+        let [x0, x1, y0, y1] = bins.ranges(spectrum.width(), spectrum.height());
         self.constant_bin = (-x0 as usize, -y0 as usize);
         let (columns, rows) = ((x1 - x0 + 1) as usize, (y1 - y0 + 1) as usize);
 
@@ -168,20 +197,7 @@ impl SpectrumImage {
         self.per_level = scale.per_level();
         self.columns.resize(columns * rows, 0);
         for (kx, to) in (x0..=x1).zip(self.columns.chunks_exact_mut(rows)) {
-            // Bins ky < 0 of a column lie at its end; column -kx is column kx upside down.
-            let column = spectrum.column(kx.unsigned_abs());
-            let (upper, lower) = to.split_at_mut(-y0 as usize);
-            if kx >= 0 {
-                scale.levels(&column[(height + y0) as usize % height as usize..][..upper.len()], upper);
-                scale.levels(&column[..lower.len()], lower);
-            } else {
-                scale.levels(&column[1..][..upper.len()], upper);
-                upper.reverse();
-                scale.levels(&column[..1], &mut lower[..1]);
-                let rest = lower.len() - 1;
-                scale.levels(&column[column.len() - rest..], &mut lower[1..]);
-                lower[1..].reverse();
-            }
+            map_column(spectrum, kx, y0, to, |bins, levels| scale.levels(bins, levels));
         }
         if config.blur {
             blur(&self.columns, rows, &mut self.blurred);

@@ -50,7 +50,12 @@ pub fn peaks<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let spectrum = GrayArgument::new("spectrum", spectrum)?;
     let view = spectrum.view()?;
-    let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
+    let config = PeakConfig {
+        neighbourhood_bins: neighbourhood,
+        threshold_levels: threshold,
+        lowest_level: 0,
+        cluster_bins: cluster,
+    };
     config.validate().map_err(value_error)?;
     let rows: Vec<f64> = py.detach(|| {
         let middle = (view.width() / 2, view.height() / 2);
@@ -74,7 +79,12 @@ pub fn scores<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let spectrum = GrayArgument::new("spectrum", spectrum)?;
     let view = spectrum.view()?;
-    let config = PeakConfig { neighbourhood_bins: neighbourhood, threshold_levels: threshold, cluster_bins: cluster };
+    let config = PeakConfig {
+        neighbourhood_bins: neighbourhood,
+        threshold_levels: threshold,
+        lowest_level: 0,
+        cluster_bins: cluster,
+    };
     config.validate().map_err(value_error)?;
     if !(ellipse > 0.0 && ellipse.is_finite()) {
         return Err(of_argument("ellipse", format!("{ellipse} is not a share of the spectrum above 0")));

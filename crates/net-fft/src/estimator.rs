@@ -1,0 +1,416 @@
+//! From a picture to the net.
+
+use net_geometry::nalgebra::{SMatrix, Vector3};
+use net_geometry::{Camera, Mesh, Plane, Pose, PoseCovariance};
+use net_image::{GrayView, Image, View};
+
+use crate::config::{ThesisConfig, PlaneSource, Selection};
+use crate::decide::{probability, sections_seeing};
+use crate::envelope::{Agreement, Envelopes};
+use crate::error::{Error, Result};
+use crate::estimate::{SectionPose, Side, ThesisEstimate, Support};
+use crate::evidence::{Reading, Section, evidence};
+use crate::field::LatticeField;
+use crate::fit::{BENT, FLAT, NormalEquations, Parameters, ParametersSquared, moved};
+use crate::plane::{SideInSection, most_confident_three, plane_from_waves, pose_in_plane};
+use crate::poses::{agreed_poses, own_poses};
+use crate::reduce::sum_of_four;
+use crate::search::{Hypothesis, Search, weakest_period};
+use crate::section::{SectionAnalyser, SectionSpectrum};
+use crate::sections::SectionView;
+
+/// Passes of the fit to the waves of all sections. Two bring it from the peaks' precision to its own; the third is for steep tilts.
+const PASSES: usize = 3;
+
+/// Finds the net of one mesh in the pictures of one camera. Owns all plans and buffers: after the first pictures it allocates nothing.
+#[derive(Debug)]
+pub struct ThesisEstimator {
+    camera: Camera,
+    mesh: Mesh,
+    config: ThesisConfig,
+    /// How often the picture is halved before the first grid.
+    first_halvings: u32,
+    /// The picture at half its size, a quarter, and so on.
+    reduced: Vec<Image<u16>>,
+    /// One for each grid.
+    analysers: Vec<SectionAnalyser>,
+    /// Sections of all grids, and the grid of each.
+    sections: Vec<Section>,
+    grids: Vec<usize>,
+    search: Search,
+    envelopes: Envelopes,
+    poses: Vec<SectionPose>,
+}
+
+impl ThesisEstimator {
+    /// For pictures of `camera` that may show a net of `mesh`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a parameter out of range, [`Error::EmptySize`] if a picture reduced for the last grid has no pixel left.
+    pub fn new(camera: &Camera, mesh: &Mesh, config: &ThesisConfig) -> Result<Self> {
+        config.validate()?;
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        let mut first_halvings = 0;
+        while (height >> first_halvings) as f64 > 1.5 * f64::from(config.working_height_px) {
+            first_halvings += 1;
+        }
+        let (mut analysers, mut sections, mut grids) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, grid) in config.grids.iter().enumerate() {
+            let halvings = first_halvings as usize + index;
+            let (width, height) = (width >> halvings, height >> halvings);
+            if width == 0 || height == 0 {
+                return Err(Error::EmptySize { width, height });
+            }
+            let size = grid.section_size(width, height);
+            let analyser = SectionAnalyser::new(size.0, size.1, &config.section)?;
+            for corner in grid.corners(width, height) {
+                let reduction = 1 << halvings;
+                // Beyond the lens model's reach there is nothing to be read.
+                let Some(view) = SectionView::new(camera, corner, size.0, size.1, reduction) else { continue };
+                let (ellipse, spectrum) = (*analyser.ellipse(), SectionSpectrum::default());
+                sections.push(Section { view, corner, size, reduction, ellipse, spectrum });
+                grids.push(index);
+            }
+            analysers.push(analyser);
+        }
+        Ok(Self {
+            camera: *camera,
+            mesh: *mesh,
+            config: config.clone(),
+            first_halvings,
+            reduced: vec![Image::default(); first_halvings as usize + config.grids.len() - 1],
+            analysers,
+            sections,
+            grids,
+            search: Search::new(&config.search),
+            envelopes: Envelopes::default(),
+            poses: Vec::new(),
+        })
+    }
+
+    /// The net in `picture`; `None` if there is nothing like one. What is returned may still be nothing: its probability says so.
+    ///
+    /// # Errors
+    /// [`Error::Size`] for a picture of another size than the camera's.
+    pub fn estimate(&mut self, picture: GrayView<'_>) -> Result<Option<ThesisEstimate>> {
+        self.analyse(picture)?;
+        self.poses.clear();
+        Ok(match self.config.selection {
+            Selection::Together => self.agree(),
+            Selection::EachSection => self.follow_thesis(),
+        })
+    }
+
+    /// All sections with their spectra, peaks and candidates, of the last picture.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// The lattices that were fitted to the last picture, best first. Empty with [`Selection::EachSection`].
+    pub fn hypotheses(&self) -> &[Hypothesis] {
+        self.search.found()
+    }
+
+    /// The net as the single sections of the last picture see it.
+    pub fn section_poses(&self) -> &[SectionPose] {
+        &self.poses
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &ThesisConfig {
+        &self.config
+    }
+
+    /// Spectra, peaks and candidates of all sections.
+    fn analyse(&mut self, picture: GrayView<'_>) -> Result<()> {
+        let (expected_width, expected_height) = (self.camera.width() as usize, self.camera.height() as usize);
+        let (width, height) = (picture.width(), picture.height());
+        if (width, height) != (expected_width, expected_height) {
+            return Err(Error::Size { expected_width, expected_height, width, height });
+        }
+        for halving in 0..self.reduced.len() {
+            let (done, rest) = self.reduced.split_at_mut(halving);
+            match done.last().and_then(Image::view) {
+                Some(larger) => sum_of_four(larger, &mut rest[0]),
+                None => sum_of_four(picture, &mut rest[0]),
+            }
+        }
+        for (section, &grid) in self.sections.iter_mut().zip(&self.grids) {
+            let analyser = &mut self.analysers[grid];
+            let ((u, v), (width, height)) = (section.corner, section.size);
+            let halvings = self.first_halvings as usize + grid;
+            if halvings == 0 {
+                let Some(part) = picture.crop(u, v, width, height) else { continue };
+                analyser.analyse(part, &mut section.spectrum)?;
+            } else {
+                let part: Option<View<'_, u16>> =
+                    self.reduced[halvings - 1].view().and_then(|picture| picture.crop(u, v, width, height));
+                let Some(part) = part else { continue };
+                analyser.analyse(part, &mut section.spectrum)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All sections together.
+    fn agree(&mut self) -> Option<ThesisEstimate> {
+        let best = *self.search.run(&self.sections, &self.mesh, &self.config.shape, &self.config.search).first()?;
+        let (fitted, agreement, information) = self.polish(&best.field)?;
+        let naming = Naming::along_u(&fitted);
+        let field = naming.of(&fitted);
+        let mesh = self.mesh_along(naming.side(), field.shape().1)?;
+        agreed_poses(&field, &self.sections, &mesh, &mut self.poses);
+        let planes = self.planes();
+        let chosen = match self.config.plane {
+            PlaneSource::Waves => None,
+            PlaneSource::MostConfidentThree => planes[0],
+            PlaneSource::Svd => planes[1],
+        };
+        let pose = match chosen {
+            Some(plane) => self.pose_in(&plane, &mesh)?,
+            None => self.pose_of(&field)?,
+        };
+        let parameters = parameter_covariance(&agreement, &information)?;
+        let covariance = self.covariance(&fitted, naming, &pose, &parameters);
+        self.finish(field, mesh, naming.side(), pose, planes, agreement, covariance)
+    }
+
+    /// Each section for itself, as the thesis has it.
+    fn follow_thesis(&mut self) -> Option<ThesisEstimate> {
+        own_poses(&self.sections, &self.mesh, self.config.search.min_angle_deg.to_radians(), &mut self.poses);
+        let planes = self.planes();
+        let plane = match self.config.plane {
+            PlaneSource::MostConfidentThree => planes[0].or(planes[1])?,
+            PlaneSource::Waves | PlaneSource::Svd => planes[1].or(planes[0])?,
+        };
+        for pose in &mut self.poses {
+            pose.choose_nearest_to(plane.normal);
+        }
+        let pose = self.pose_in(&plane, &self.mesh)?;
+        let fitted = LatticeField::of_mesh(&self.mesh, &pose.rotation, plane.distance);
+        let naming = Naming::along_u(&fitted);
+        let field = naming.of(&fitted);
+        let mesh = self.mesh_along(naming.side(), field.shape().1)?;
+        let pose = Pose { rotation: field.rotation(), translation: pose.translation };
+        self.envelopes.extract(&field, &self.sections);
+        let mut equations = NormalEquations::about(&field, FLAT);
+        let agreement = self.envelopes.measure(&mut equations, &self.sections).unwrap_or_default();
+        let covariance =
+            self.covariance(&fitted, naming, &pose, &ParametersSquared::from_diagonal(&THESIS_VARIANCES.into()));
+        self.finish(field, mesh, naming.side(), pose, planes, agreement, covariance)
+    }
+
+    /// Fits the field to the waves of all sections, flat, then bent, and keeps the bend if the waves ask for it. Returns the field, how well the sections agree on it, and the information matrix.
+    fn polish(&mut self, field: &LatticeField) -> Option<(LatticeField, Agreement, ParametersSquared)> {
+        let flat = self.fit_waves(field, FLAT)?;
+        if self.config.shape.sigma_curvature_per_m == 0.0 {
+            return Some(flat);
+        }
+        let Some(bent) = self.fit_waves(&flat.0, BENT) else { return Some(flat) };
+        // Bayesian information criterion: three numbers more must earn their keep. (Misfits are twice a logarithm of likelihood.)
+        let price = 3.0 * f64::from(flat.1.measurements).ln();
+        let same = flat.1.measurements == bent.1.measurements;
+        let better = if same { flat.1.misfit - bent.1.misfit } else { mean_misfit(&flat.1, &bent.1) };
+        Some(if better > price { bent } else { flat })
+    }
+
+    fn fit_waves(
+        &mut self,
+        field: &LatticeField,
+        fitted: usize,
+    ) -> Option<(LatticeField, Agreement, ParametersSquared)> {
+        let mut field = *field;
+        for pass in 0..=PASSES {
+            self.envelopes.extract(&field, &self.sections);
+            let mut equations = NormalEquations::about(&field, fitted);
+            let agreement = self.envelopes.measure(&mut equations, &self.sections)?;
+            equations.add_shape(&self.mesh, &self.config.shape);
+            if fitted == BENT {
+                equations.add_bend(&self.mesh, &self.config.shape);
+            }
+            if pass == PASSES {
+                return Some((field, agreement, equations.matrix));
+            }
+            field = equations.solve(0.3)?;
+        }
+        None
+    }
+
+    /// Planes by the three most confident sections, by all, and in closed form.
+    fn planes(&self) -> [Option<Plane>; 3] {
+        let places = self.poses.iter().map(SectionPose::place);
+        [self.plane_of_three(), Plane::fit(places).ok(), self.plane_of_waves()]
+    }
+
+    fn plane_of_three(&self) -> Option<Plane> {
+        let three = most_confident_three(self.poses.iter().map(SectionPose::mean_confidence))?;
+        Plane::through_points(three.map(|i| self.poses[i].place())).ok()
+    }
+
+    fn plane_of_waves(&self) -> Option<Plane> {
+        let waves = self.poses.iter().map(|pose| {
+            let view = &self.sections[pose.section].view;
+            (pose.bins.map(|bin| view.ideal_from_bin(bin)), view.ray, 1.0)
+        });
+        plane_from_waves(waves, &self.mesh).ok()
+    }
+
+    /// The mesh with its sides in the order of the frame, at the given crossing angle.
+    fn mesh_along(&self, x_side: Side, angle: f64) -> Option<Mesh> {
+        let (first, second) = match x_side {
+            Side::First => (self.mesh.side1(), self.mesh.side2()),
+            Side::Second => (self.mesh.side2(), self.mesh.side1()),
+        };
+        Mesh::oblique(first, second, angle).ok()
+    }
+
+    /// The pose of a lattice, its origin on the optical axis.
+    fn pose_of(&self, field: &LatticeField) -> Option<Pose> {
+        let range = Plane { normal: field.normal, distance: field.distance(&self.mesh) }.range()?;
+        Some(Pose { rotation: field.rotation(), translation: Vector3::z() * range })
+    }
+
+    /// The pose in `plane` by the side of higher total confidence (eq. 4.26 to 4.29).
+    fn pose_in(&self, plane: &Plane, mesh: &Mesh) -> Option<Pose> {
+        // A confidence without a rival is no better than a very good one.
+        let weight = |pose: &SectionPose, side: usize| pose.confidence[side].ratio.clamp(1e-3, 10.0);
+        let total = |side: usize| self.poses.iter().map(|pose| weight(pose, side)).sum::<f64>();
+        let side = usize::from(total(1) > total(0));
+        let sides = self.poses.iter().map(|pose| {
+            let view = &self.sections[pose.section].view;
+            let step = if side == 0 { pose.basis.b1 } else { pose.basis.b2 };
+            SideInSection { ray: view.ray, step: view.ideal_step(step), weight: weight(pose, side) }
+        });
+        pose_in_plane(plane, sides, if side == 0 { 0.0 } else { mesh.angle() }).ok()
+    }
+
+    fn finish(
+        &self,
+        field: LatticeField,
+        mesh: Mesh,
+        x_side: Side,
+        pose: Pose,
+        planes: [Option<Plane>; 3],
+        agreement: Agreement,
+        covariance: PoseCovariance,
+    ) -> Option<ThesisEstimate> {
+        let support = Support {
+            evidence: evidence(&field, &self.sections, None, 4, Reading::Here),
+            sections_seeing: sections_seeing(&field, &self.sections),
+            period_margin_nats: weakest_period(&field, &self.sections).0,
+            second_harmonic: self.envelopes.second_harmonic(&field, &self.sections).map(|(sum, _)| sum),
+            residual_bins: agreement.residual_bins,
+            measurements: agreement.measurements,
+        };
+        let [k1, k2] = field.waves(Vector3::z())?;
+        Some(ThesisEstimate {
+            pose,
+            plane: pose.plane(),
+            mesh,
+            x_side,
+            field,
+            probability: probability(&support),
+            covariance,
+            support,
+            axis_cell_area: self.camera.fx() * self.camera.fy() / k1.perp(&k2).abs(),
+            plane_of_three: planes[0],
+            plane_of_all: planes[1],
+            plane_of_waves: planes[2],
+        })
+    }
+
+    /// Of the pose, from that of the fit's six numbers; the place along the net is spread evenly over a cell.
+    fn covariance(
+        &self,
+        fitted: &LatticeField,
+        naming: Naming,
+        pose: &Pose,
+        parameters: &ParametersSquared,
+    ) -> PoseCovariance {
+        let mut derivatives = SMatrix::<f64, 6, BENT>::zeros();
+        let here = self.pose_of(&naming.of(fitted));
+        for k in 0..BENT {
+            let mut step = Parameters::zeros();
+            step[k] = DERIVATIVE_STEP;
+            let near = self.pose_of(&naming.of(&moved(fitted, &step)));
+            let (Some(here), Some(near)) = (&here, &near) else { continue };
+            let (turn, shift) = here.perturbation_to(near);
+            derivatives.fixed_view_mut::<3, 1>(0, k).copy_from(&(turn / DERIVATIVE_STEP));
+            derivatives.fixed_view_mut::<3, 1>(3, k).copy_from(&(shift / DERIVATIVE_STEP));
+        }
+        let mut matrix = derivatives * parameters * derivatives.transpose();
+        // Of a place anywhere between two nodes, a side's twelfth squared.
+        let spread = self.mesh.cell_area() / 12.0;
+        for axis in [pose.x_axis(), pose.y_axis()] {
+            let mut place = matrix.fixed_view_mut::<3, 3>(3, 3);
+            place += axis * axis.transpose() * spread;
+        }
+        PoseCovariance { matrix: 0.5 * (matrix + matrix.transpose()) }
+    }
+}
+
+/// For derivatives by differences: fields are smooth over 1e-2, doubles carry 1e-16.
+const DERIVATIVE_STEP: f64 = 1e-5;
+
+/// Variances of the six numbers where sections pick for themselves and have no common fit, rad² and relative: 5 degrees and 5 %, as the thesis's tables show.
+const THESIS_VARIANCES: [f64; BENT] = [0.0076, 0.0076, 0.0076, 0.0025, 0.0025, 0.0076, 0.0, 0.0, 0.0];
+
+/// Covariance of the fit's six numbers by a sandwich over sections (what one section has wrong, all its waves have), and what the waves' own errors give.
+fn parameter_covariance(agreement: &Agreement, information: &ParametersSquared) -> Option<ParametersSquared> {
+    let inverse = information.cholesky()?.inverse();
+    let sections = f64::from(agreement.sections);
+    // Six numbers, two to a section, were fitted: what is left is that much smaller than what was there.
+    let lost = sections / (sections - 3.0).max(1.0);
+    Some(inverse * agreement.scatter * inverse * lost + inverse)
+}
+
+/// What the misfit falls by when the two fits did not compare the same numbers: per number, times the fewer.
+fn mean_misfit(flat: &Agreement, bent: &Agreement) -> f64 {
+    let mean = |agreement: &Agreement| agreement.misfit / f64::from(agreement.measurements.max(1));
+    (mean(flat) - mean(bent)) * f64::from(flat.measurements.min(bent.measurements))
+}
+
+/// One of the four ways to name a lattice's sides: which of its side directions, and which way along it, comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Naming {
+    First,
+    FirstReversed,
+    Second,
+    SecondReversed,
+}
+
+impl Naming {
+    /// The one that brings X nearest to the image's u axis.
+    fn along_u(field: &LatticeField) -> Self {
+        let turn = |naming: Self| {
+            let rotation = naming.of(field).rotation();
+            Pose { rotation, translation: Vector3::z() }.in_plane_rotation().abs()
+        };
+        // At exactly 45 degrees the first: at -45 the second side has +45, which the range (-45, 45] prefers, but rounding decides there anyway.
+        let mut best = Self::First;
+        for naming in [Self::FirstReversed, Self::Second, Self::SecondReversed] {
+            if turn(naming) < turn(best) - 1e-12 {
+                best = naming;
+            }
+        }
+        best
+    }
+
+    fn of(self, field: &LatticeField) -> LatticeField {
+        let [g1, g2] = field.duals;
+        let duals = match self {
+            Self::First => [g1, g2],
+            Self::FirstReversed => [-g1, -g2],
+            Self::Second => [g2, -g1],
+            Self::SecondReversed => [-g2, g1],
+        };
+        LatticeField { duals, ..*field }
+    }
+
+    fn side(self) -> Side {
+        match self {
+            Self::First | Self::FirstReversed => Side::First,
+            Self::Second | Self::SecondReversed => Side::Second,
+        }
+    }
+}
