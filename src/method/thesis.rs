@@ -20,7 +20,6 @@ const SNAP_CELLS: f64 = 0.35;
 #[derive(Debug)]
 pub(crate) struct ThesisMethod {
     camera: Camera,
-    mesh: Mesh,
     estimator: ThesisEstimator,
     detector: JunctionDetector,
     flow: FlowTracker,
@@ -34,7 +33,6 @@ impl ThesisMethod {
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         Ok(Self {
             camera: *camera,
-            mesh: *mesh,
             estimator: ThesisEstimator::new(camera, mesh, config)?,
             detector: JunctionDetector::new(width, height, &net_junction::Config::default())?,
             flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
