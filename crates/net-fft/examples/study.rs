@@ -73,7 +73,8 @@ fn net(random: &mut Random, mesh: &Mesh, range_m: f64) -> Layer {
         net.shear_deg = random.between(-18.0, 18.0);
     }
     if random.chance(0.4) {
-        net.surface.curvature_per_m = std::array::from_fn(|k| random.between(-0.3, 0.3) * if k == 1 { 0.5 } else { 1.0 });
+        net.surface.curvature_per_m =
+            std::array::from_fn(|k| random.between(-0.3, 0.3) * if k == 1 { 0.5 } else { 1.0 });
     }
     net.jitter = if random.chance(0.5) { random.between(0.0, 0.04) } else { 0.0 };
     net.broken = if random.chance(0.2) { random.between(0.0, 0.1) } else { 0.0 };
@@ -83,8 +84,9 @@ fn net(random: &mut Random, mesh: &Mesh, range_m: f64) -> Layer {
 }
 
 /// A picture that could be taken for a net.
-fn decoy(random: &mut Random, scene: &mut Scene, seed: u64) {
+fn decoy(random: &mut Random, scene: &mut Scene, seed: u64) -> String {
     let choice = random.of(Texture::ALL.len() + 6);
+    let mut what = String::from("Water");
     if let Some(&texture) = Texture::ALL.get(choice) {
         let pose = NetPose {
             range_m: random.scale(0.4, 4.0),
@@ -94,10 +96,18 @@ fn decoy(random: &mut Random, scene: &mut Scene, seed: u64) {
             ..NetPose::default()
         };
         let scale_m = random.scale(0.02, 0.1);
-        scene.backdrop =
-            Some(Backdrop { texture, pose, scale_m, contrast_grey: random.between(10.0, 50.0), seed, ..Backdrop::default() });
+        what = format!("{texture:?}");
+        scene.backdrop = Some(Backdrop {
+            texture,
+            pose,
+            scale_m,
+            contrast_grey: random.between(10.0, 50.0),
+            seed,
+            ..Backdrop::default()
+        });
     } else if choice < Texture::ALL.len() + 5 {
         let kind = [Kind::Fish, Kind::Rope, Kind::Ladder, Kind::Kelp, Kind::Rod][choice - Texture::ALL.len()];
+        what = format!("{kind:?}");
         for k in 0..1 + random.of(8) {
             scene.objects.push(Object {
                 kind,
@@ -113,12 +123,15 @@ fn decoy(random: &mut Random, scene: &mut Scene, seed: u64) {
             });
         }
     }
+    what
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize, default: u64| std::env::args().nth(k).map_or(Ok(default), |text| text.parse());
     let (count, first) = (argument(1, 100)?, argument(2, 1000)?);
-    println!("seed,net,range_m,tilt_deg,probability,right,range_off,normal_off_deg,turn_off_deg,range_sigmas,tilt_sigmas,evidence,terms,seeing,margin,second_1,second_2,residual,measurements");
+    println!(
+        "seed,net,range_m,tilt_deg,probability,right,range_off,normal_off_deg,turn_off_deg,range_sigmas,tilt_sigmas,evidence,terms,seeing,margin,second_1,second_2,misfit,measurements,mixed,angle_sigmas,residual,ratio_off,what"
+    );
     let camera = Camera::new(600.0, 600.0, 424.0, 240.0, 848, 480, Lens::None)?;
     let mut simulator = Simulator::new(camera);
     let mut picture = Image::default();
@@ -133,24 +146,27 @@ fn main() -> Result<(), Box<dyn Error>> {
             2 => Mesh::oblique(0.05, 0.05, 1.25)?,
             _ => Mesh::square(0.05)?,
         };
+        let mut what = format!("{:.0}x{:.0}", mesh.side1() * 1e3, mesh.side2() * 1e3);
         if has_net {
             let range = mesh.side1() / 0.05 * random.scale(0.3, 6.0);
             scene.layers.push(net(&mut random, &mesh, range));
             if random.chance(0.15) {
-                let mut second = net(&mut random, &mesh, range * random.between(1.3, 2.5));
+                let behind = range * random.between(1.3, 2.5);
+                let mut second = net(&mut random, &mesh, behind);
                 second.pose.tilt_x_deg = scene.layers[0].pose.tilt_x_deg;
                 second.pose.tilt_y_deg = scene.layers[0].pose.tilt_y_deg;
                 scene.layers.push(second);
+                what += " two";
             }
         } else {
-            decoy(&mut random, &mut scene, seed);
+            what = decoy(&mut random, &mut scene, seed);
         }
         let truth = simulator.render(&scene, seed, &mut picture)?;
         let axis = truth.layers.first().and_then(|layer| layer.axis);
         let mut estimator = ThesisEstimator::new(&camera, &mesh, &ThesisConfig::default())?;
         let found = estimator.estimate(picture.view().ok_or("no picture")?)?;
         let Some(found) = found else {
-            println!("{seed},{has_net},,,0,,,,,,,,,,,,,,");
+            println!("{seed},{has_net},,,0,,,,,,,,,,,,,,,,,,{what}");
             continue;
         };
         let degrees = |a: &net_geometry::nalgebra::Vector3<f64>, b: &net_geometry::nalgebra::Vector3<f64>| {
@@ -168,7 +184,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let support = &found.support;
         let mean = |family: usize| support.evidence.families[family] / f64::from(support.evidence.terms[family].max(1));
         println!(
-            "{seed},{has_net},{:.3},{:.1},{:.4},{right},{range_off:.4},{normal_off:.3},{turn_off:.3},{range_sigmas:.2},{tilt_sigmas:.2},{:.3},{},{:.3},{:.3},{:.2},{:.2},{:.4},{}",
+            "{seed},{has_net},{:.3},{:.1},{:.4},{right},{range_off:.4},{normal_off:.3},{turn_off:.3},{range_sigmas:.2},{tilt_sigmas:.2},{:.3},{},{:.3},{:.3},{:.2},{:.2},{:.4},{},{:.3},{:.2},{:.4},{:.4},{what}",
             axis.map_or(f64::NAN, |axis| axis.range_m),
             axis.map_or(f64::NAN, |axis| axis.normal.z.acos().to_degrees()),
             found.probability,
@@ -178,8 +194,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             support.period_margin_nats,
             support.second_harmonic[0],
             support.second_harmonic[1],
-            support.residual_bins,
+            support.misfit,
             support.measurements,
+            support.mixed_orders_nats,
+            support.angle_sigmas,
+            support.residual_bins,
+            support.ratio_off,
         );
     }
     Ok(())

@@ -30,26 +30,84 @@ pub(crate) fn sections_seeing(field: &LatticeField, sections: &[Section]) -> f64
     if able > 0.0 { seeing / able } else { 0.0 }
 }
 
-/// Features
-pub(crate) fn features(support: &Support) -> [f64; 6] {
+/// How much higher the spectrum stands at sums and differences of the two wave vectors than at the weaker of them, nats, in the mean over sections; or, if that is more, twice
+/// what it has at half of these. Two families of thin twines add up, so that a net has little at the sums and nothing at the halves; scales and hexagons, whose lattice
+/// fits as well, have as much there as anywhere, and bricks, with another one in the middle of each cell, have it at the halves.
+pub(crate) fn mixed_orders(field: &LatticeField, sections: &[Section]) -> f64 {
+    let mean = |part: f64, weight: f32| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for section in sections {
+            let Some([first, second]) = section.bins_of(field) else { continue };
+            let bins = [first, second, (first + second) * part, (first - second) * part];
+            if let [Some(a), Some(b), Some(c), Some(d)] = bins.map(|bin| section.rise(bin, Reading::Here)) {
+                // One of the two is enough: in a wall seen askew the other may be weak.
+                sum += f64::from(weight * c.max(d) - a.min(b));
+                count += 1.0;
+            }
+        }
+        sum / f64::max(count, 1.0)
+    };
+    mean(1.0, 1.0).max(mean(0.5, 2.0))
+}
+
+/// Probability that what has such support is a net with the right pose: logistic, its weights fitted to the simulator's random scenes and rounded (`examples/study.rs`).
+pub(crate) fn probability(support: &Support) -> f64 {
     let mean = |family: usize| support.evidence.families[family] / f64::from(support.evidence.terms[family].max(1));
     let [light, dark] =
         [1.0, -1.0].map(|sign| (sign * support.second_harmonic[0]).min(sign * support.second_harmonic[1]));
-    [
-        mean(0).min(mean(1)),
-        f64::from(support.evidence.terms[0].min(support.evidence.terms[1])).max(1.0).ln(),
-        support.sections_seeing,
-        support.period_margin_nats.clamp(-0.5, 1.0),
-        light.max(dark).clamp(-1.0, 4.0),
-        support.residual_bins.min(1.0),
-    ]
+    let logit = -4.2
+        + 0.3 * mean(0).min(mean(1)).min(3.0)
+        + 0.5 * support.sections_seeing
+        // Preferring a rival speaks against the period; no rival at all, as far away, speaks for nothing.
+        + support.period_margin_nats.clamp(-1.0, 0.0)
+        + 0.4 * light.max(dark).clamp(-1.0, 4.0)
+        // Noise alone leaves 0.4, a good fit of twine that is not straight 1.
+        - 3.5 * (support.misfit - 1.5).max(0.0)
+        - 4.2 * support.mixed_orders_nats.clamp(-1.6, 1.0)
+        - 0.2 * (support.angle_sigmas.abs() - 1.0).clamp(0.0, 3.0)
+        - 1.2 * (20.0 * support.ratio_off.abs()).min(3.0);
+    1.0 / (1.0 + (-logit).exp())
 }
 
-/// Probability that what has such support is a net with the right pose.
-pub(crate) fn probability(support: &Support) -> f64 {
-    let mut logit: f64 = -4.0;
-    for (feature, weight) in features(support).into_iter().zip([1.0, 0.0, 3.0, 1.0, 0.5, -1.0]) {
-        logit += weight * feature;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::Evidence;
+
+    /// A clear net, as the simulator draws it a metre away.
+    fn clear() -> Support {
+        Support {
+            evidence: Evidence { families: [60.0, 55.0], terms: [20, 20] },
+            sections_seeing: 1.0,
+            period_margin_nats: 1.2,
+            second_harmonic: [4.5, 4.4],
+            mixed_orders_nats: -2.0,
+            misfit: 0.5,
+            measurements: 120,
+            ..Support::default()
+        }
     }
-    1.0 / (1.0 + (-logit).exp())
+
+    #[test]
+    fn a_clear_net_is_sure_and_every_single_doubt_lowers_it() {
+        let sure = probability(&clear());
+        assert!(sure > 0.99, "{sure}");
+        for doubt in [
+            Support { evidence: Evidence { families: [60.0, 5.0], terms: [20, 20] }, ..clear() },
+            Support { sections_seeing: 0.3, ..clear() },
+            Support { period_margin_nats: -0.5, ..clear() },
+            Support { second_harmonic: [4.5, -4.4], ..clear() },
+            Support { mixed_orders_nats: -0.5, ..clear() },
+            Support { misfit: 3.0, ..clear() },
+            Support { angle_sigmas: -3.0, ..clear() },
+            Support { ratio_off: 0.1, ..clear() },
+        ] {
+            assert!(probability(&doubt) < sure, "{doubt:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_seen_is_no_net() {
+        assert!(probability(&Support::default()) < 0.05);
+    }
 }

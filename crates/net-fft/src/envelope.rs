@@ -40,6 +40,14 @@ struct Wave {
     amplitudes: [Complex64; POINTS],
     /// Root mean square of the amplitudes that the background alone would give.
     noise: f64,
+    /// How much more the wave vector is off than its patch shows.
+    gain: f64,
+}
+
+/// A patch around a foretold bin pulls what it shows towards that bin, the more the smaller it is. Of a Hann window's peak within a patch that falls to zero as a cosine at
+/// `radius` bins, this many times the drift seen is the drift there is (fitted to within 3 % from 1.5 bins on, 10 % at 1.2). Without it the fit creeps, and stops on its way.
+fn patch_gain(radius: f64) -> f64 {
+    1.0 + 1.40 / radius.powi(2) + 3.78 / radius.powi(4)
 }
 
 impl Wave {
@@ -82,14 +90,21 @@ impl Envelopes {
                     let amplitudes = cut_out(section, at, radius);
                     // The patch's weights, squared, sum to 0.3 of its circle's square, and the window lets 3/8 of the power through along each side.
                     let noise = background(section, at) * (0.4 * PI).sqrt() * radius;
-                    self.waves.push(Wave { section: index, family, harmonic, amplitudes, noise });
+                    let gain = patch_gain(radius);
+                    self.waves.push(Wave { section: index, family, harmonic, amplitudes, noise, gain });
                 }
             }
         }
     }
 
     /// Adds to the normal equations what the phases left after demodulation say. Returns how well they agree; `None` if there are too few.
-    pub(crate) fn measure(&self, equations: &mut NormalEquations, sections: &[Section]) -> Option<Agreement> {
+    /// Residuals of `tolerance` bins and more count less and less (Cauchy).
+    pub(crate) fn measure(
+        &self,
+        equations: &mut NormalEquations,
+        sections: &[Section],
+        tolerance: f64,
+    ) -> Option<Agreement> {
         let field = equations.field;
         let mut agreement = Agreement::default();
         let (mut squares, mut weights) = (0.0, 0.0);
@@ -115,7 +130,7 @@ impl Envelopes {
                 }
                 // Cycles per section are bins; of the fundamental, whichever harmonic tells them.
                 let n = wave.harmonic as f64;
-                let residual = drift.arg() / TAU / STEP / n;
+                let residual = wave.gain * drift.arg() / TAU / STEP / n;
                 let mean_change = |field: &LatticeField| {
                     let phases = section.view.grid_rays.map(|ray| field.phases(ray)[wave.family]);
                     let mut sum = 0.0;
@@ -126,7 +141,7 @@ impl Envelopes {
                 let sigma =
                     (SIGMA_AT_BACKGROUND_BINS / ratio.max(0.3) / coherence.max(0.1)).hypot(SIGMA_AT_BEST_BINS) / n;
                 // Far off is another wave: a second net's, a rope's.
-                let certainty = 1.0 / (1.0 + (residual / (3.0 * sigma).max(0.1)).powi(2));
+                let certainty = 1.0 / (1.0 + (residual / (3.0 * sigma).max(tolerance)).powi(2));
                 let weight = certainty / (sigma * sigma);
                 let (_, derivatives) = equations.derive(mean_change)?;
                 equations.add(residual, &derivatives, weight);
@@ -180,6 +195,18 @@ pub(crate) struct Agreement {
 }
 
 impl Agreement {
+    /// By how much the misfit is smaller than the other's: mean to mean, times the fewer measurements, for not all fits compare the same.
+    pub(crate) fn gain_over(&self, other: &Self) -> f64 {
+        let mean = |agreement: &Self| agreement.misfit / f64::from(agreement.measurements.max(1));
+        (mean(other) - mean(self)) * f64::from(self.measurements.min(other.measurements))
+    }
+
+    /// Whether a fit from elsewhere should take the other's place: little of a wrong fit is left in the right one, and it leaves few waves out.
+    pub(crate) fn is_clearly_better_than(&self, other: &Self) -> bool {
+        let mean = |agreement: &Self| agreement.misfit / f64::from(agreement.measurements.max(1));
+        mean(self) < 0.75 * mean(other) && 4 * self.measurements >= 3 * other.measurements
+    }
+
     fn close_section(&mut self, gradient: &mut Parameters) {
         if *gradient != Parameters::zeros() {
             self.scatter.ger(1.0, gradient, gradient, 1.0);

@@ -64,6 +64,14 @@ pub struct Support {
     pub second_harmonic: [f64; 2],
     /// Root mean square of what the fit leaves of the wave vectors, bins.
     pub residual_bins: f64,
+    /// How much higher the spectrum stands at sums and differences of the wave vectors than at themselves, or twice what it has at half of these, nats: well below 0 of a net.
+    pub mixed_orders_nats: f64,
+    /// How far the crossing angle is from the mesh's, standard deviations of [`crate::ShapeConfig`].
+    pub angle_sigmas: f64,
+    /// How far the ratio of the sides is from the mesh's, relative.
+    pub ratio_off: f64,
+    /// Mean of `ln(1 + (r / σ)²)` over the residuals r of the fit: 0.4 of noise alone; far above, the lattice is not what the waves show.
+    pub misfit: f64,
     /// Numbers that the fit compared.
     pub measurements: u32,
 }

@@ -1,26 +1,27 @@
 //! From a picture to the net.
 
+use std::f64::consts::PI;
+
 use net_geometry::nalgebra::{SMatrix, Vector3};
 use net_geometry::{Camera, Mesh, Plane, Pose, PoseCovariance};
 use net_image::{GrayView, Image, View};
 
-use crate::config::{ThesisConfig, PlaneSource, Selection};
-use crate::decide::{probability, sections_seeing};
+use crate::config::{PlaneSource, Selection, ThesisConfig};
+use crate::decide::{mixed_orders, probability, sections_seeing};
 use crate::envelope::{Agreement, Envelopes};
 use crate::error::{Error, Result};
-use crate::estimate::{SectionPose, Side, ThesisEstimate, Support};
+use crate::estimate::{SectionPose, Side, Support, ThesisEstimate};
 use crate::evidence::{Reading, Section, evidence};
 use crate::field::LatticeField;
 use crate::fit::{BENT, FLAT, NormalEquations, Parameters, ParametersSquared, moved};
+use crate::naming::Naming;
 use crate::plane::{SideInSection, most_confident_three, plane_from_waves, pose_in_plane};
+use crate::polish::{Fitted, LAST_TOLERANCE_BINS, polish};
 use crate::poses::{agreed_poses, own_poses};
 use crate::reduce::sum_of_four;
 use crate::search::{Hypothesis, Search, weakest_period};
 use crate::section::{SectionAnalyser, SectionSpectrum};
 use crate::sections::SectionView;
-
-/// Passes of the fit to the waves of all sections. Two bring it from the peaks' precision to its own; the third is for steep tilts.
-const PASSES: usize = 3;
 
 /// Finds the net of one mesh in the pictures of one camera. Owns all plans and buffers: after the first pictures it allocates nothing.
 #[derive(Debug)]
@@ -155,7 +156,9 @@ impl ThesisEstimator {
     /// All sections together.
     fn agree(&mut self) -> Option<ThesisEstimate> {
         let best = *self.search.run(&self.sections, &self.mesh, &self.config.shape, &self.config.search).first()?;
-        let (fitted, agreement, information) = self.polish(&best.field)?;
+        let fitted = polish(&best.field, &mut self.envelopes, &self.sections, &self.mesh, &self.config)?;
+        let parameters = fitted.covariance()?;
+        let Fitted { field: fitted, agreement, .. } = fitted;
         let naming = Naming::along_u(&fitted);
         let field = naming.of(&fitted);
         let mesh = self.mesh_along(naming.side(), field.shape().1)?;
@@ -170,7 +173,6 @@ impl ThesisEstimator {
             Some(plane) => self.pose_in(&plane, &mesh)?,
             None => self.pose_of(&field)?,
         };
-        let parameters = parameter_covariance(&agreement, &information)?;
         let covariance = self.covariance(&fitted, naming, &pose, &parameters);
         self.finish(field, mesh, naming.side(), pose, planes, agreement, covariance)
     }
@@ -194,46 +196,10 @@ impl ThesisEstimator {
         let pose = Pose { rotation: field.rotation(), translation: pose.translation };
         self.envelopes.extract(&field, &self.sections);
         let mut equations = NormalEquations::about(&field, FLAT);
-        let agreement = self.envelopes.measure(&mut equations, &self.sections).unwrap_or_default();
+        let agreement = self.envelopes.measure(&mut equations, &self.sections, LAST_TOLERANCE_BINS).unwrap_or_default();
         let covariance =
             self.covariance(&fitted, naming, &pose, &ParametersSquared::from_diagonal(&THESIS_VARIANCES.into()));
         self.finish(field, mesh, naming.side(), pose, planes, agreement, covariance)
-    }
-
-    /// Fits the field to the waves of all sections, flat, then bent, and keeps the bend if the waves ask for it. Returns the field, how well the sections agree on it, and the information matrix.
-    fn polish(&mut self, field: &LatticeField) -> Option<(LatticeField, Agreement, ParametersSquared)> {
-        let flat = self.fit_waves(field, FLAT)?;
-        if self.config.shape.sigma_curvature_per_m == 0.0 {
-            return Some(flat);
-        }
-        let Some(bent) = self.fit_waves(&flat.0, BENT) else { return Some(flat) };
-        // Bayesian information criterion: three numbers more must earn their keep. (Misfits are twice a logarithm of likelihood.)
-        let price = 3.0 * f64::from(flat.1.measurements).ln();
-        let same = flat.1.measurements == bent.1.measurements;
-        let better = if same { flat.1.misfit - bent.1.misfit } else { mean_misfit(&flat.1, &bent.1) };
-        Some(if better > price { bent } else { flat })
-    }
-
-    fn fit_waves(
-        &mut self,
-        field: &LatticeField,
-        fitted: usize,
-    ) -> Option<(LatticeField, Agreement, ParametersSquared)> {
-        let mut field = *field;
-        for pass in 0..=PASSES {
-            self.envelopes.extract(&field, &self.sections);
-            let mut equations = NormalEquations::about(&field, fitted);
-            let agreement = self.envelopes.measure(&mut equations, &self.sections)?;
-            equations.add_shape(&self.mesh, &self.config.shape);
-            if fitted == BENT {
-                equations.add_bend(&self.mesh, &self.config.shape);
-            }
-            if pass == PASSES {
-                return Some((field, agreement, equations.matrix));
-            }
-            field = equations.solve(0.3)?;
-        }
-        None
     }
 
     /// Planes by the three most confident sections, by all, and in closed form.
@@ -294,12 +260,19 @@ impl ThesisEstimator {
         agreement: Agreement,
         covariance: PoseCovariance,
     ) -> Option<ThesisEstimate> {
+        // Naming the second side first turns the angle into its supplement.
+        let (ratio, angle) = field.shape();
+        let (ratio, angle) = if x_side == Side::First { (ratio, angle) } else { (1.0 / ratio, PI - angle) };
         let support = Support {
             evidence: evidence(&field, &self.sections, None, 4, Reading::Here),
             sections_seeing: sections_seeing(&field, &self.sections),
             period_margin_nats: weakest_period(&field, &self.sections).0,
             second_harmonic: self.envelopes.second_harmonic(&field, &self.sections).map(|(sum, _)| sum),
+            mixed_orders_nats: mixed_orders(&field, &self.sections),
+            ratio_off: (ratio * self.mesh.side2() / self.mesh.side1()).ln(),
+            angle_sigmas: (angle - self.mesh.angle()).to_degrees() / self.config.shape.sigma_angle_deg,
             residual_bins: agreement.residual_bins,
+            misfit: agreement.misfit / f64::from(agreement.measurements.max(1)),
             measurements: agreement.measurements,
         };
         let [k1, k2] = field.waves(Vector3::z())?;
@@ -354,63 +327,3 @@ const DERIVATIVE_STEP: f64 = 1e-5;
 
 /// Variances of the six numbers where sections pick for themselves and have no common fit, rad² and relative: 5 degrees and 5 %, as the thesis's tables show.
 const THESIS_VARIANCES: [f64; BENT] = [0.0076, 0.0076, 0.0076, 0.0025, 0.0025, 0.0076, 0.0, 0.0, 0.0];
-
-/// Covariance of the fit's six numbers by a sandwich over sections (what one section has wrong, all its waves have), and what the waves' own errors give.
-fn parameter_covariance(agreement: &Agreement, information: &ParametersSquared) -> Option<ParametersSquared> {
-    let inverse = information.cholesky()?.inverse();
-    let sections = f64::from(agreement.sections);
-    // Six numbers, two to a section, were fitted: what is left is that much smaller than what was there.
-    let lost = sections / (sections - 3.0).max(1.0);
-    Some(inverse * agreement.scatter * inverse * lost + inverse)
-}
-
-/// What the misfit falls by when the two fits did not compare the same numbers: per number, times the fewer.
-fn mean_misfit(flat: &Agreement, bent: &Agreement) -> f64 {
-    let mean = |agreement: &Agreement| agreement.misfit / f64::from(agreement.measurements.max(1));
-    (mean(flat) - mean(bent)) * f64::from(flat.measurements.min(bent.measurements))
-}
-
-/// One of the four ways to name a lattice's sides: which of its side directions, and which way along it, comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Naming {
-    First,
-    FirstReversed,
-    Second,
-    SecondReversed,
-}
-
-impl Naming {
-    /// The one that brings X nearest to the image's u axis.
-    fn along_u(field: &LatticeField) -> Self {
-        let turn = |naming: Self| {
-            let rotation = naming.of(field).rotation();
-            Pose { rotation, translation: Vector3::z() }.in_plane_rotation().abs()
-        };
-        // At exactly 45 degrees the first: at -45 the second side has +45, which the range (-45, 45] prefers, but rounding decides there anyway.
-        let mut best = Self::First;
-        for naming in [Self::FirstReversed, Self::Second, Self::SecondReversed] {
-            if turn(naming) < turn(best) - 1e-12 {
-                best = naming;
-            }
-        }
-        best
-    }
-
-    fn of(self, field: &LatticeField) -> LatticeField {
-        let [g1, g2] = field.duals;
-        let duals = match self {
-            Self::First => [g1, g2],
-            Self::FirstReversed => [-g1, -g2],
-            Self::Second => [g2, -g1],
-            Self::SecondReversed => [-g2, g1],
-        };
-        LatticeField { duals, ..*field }
-    }
-
-    fn side(self) -> Side {
-        match self {
-            Self::First | Self::FirstReversed => Side::First,
-            Self::Second | Self::SecondReversed => Side::Second,
-        }
-    }
-}

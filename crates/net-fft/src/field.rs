@@ -38,7 +38,8 @@ impl LatticeField {
         let (a1, a2) = (mesh.a1(), mesh.a2());
         let per_area = distance / a1.perp(&a2);
         let in_camera = |x: f64, y: f64| camera_from_net * (Vector3::new(x, y, 0.0) * per_area);
-        Self { normal: camera_from_net * Vector3::z(), duals: [in_camera(a2.y, -a2.x), in_camera(-a1.y, a1.x)] }
+        let duals = [in_camera(a2.y, -a2.x), in_camera(-a1.y, a1.x)];
+        Self { normal: camera_from_net * Vector3::z(), duals, bend: [0.0; 3] }
     }
 
     /// The same with all wave vectors times `factor`: of a net of the same mesh that many times as far.
@@ -152,10 +153,10 @@ mod tests {
             let phase = |x: f64, y: f64| field.phases(Vector3::new(x, y, 1.0));
             let waves = field.waves(Vector3::new(x, y, 1.0)).unwrap();
             let h = 1e-6;
-            for family in 0..2 {
+            for (family, wave) in waves.iter().enumerate() {
                 let du = (phase(x + h, y)[family] - phase(x - h, y)[family]) / (2.0 * h);
                 let dv = (phase(x, y + h)[family] - phase(x, y - h)[family]) / (2.0 * h);
-                assert!((waves[family] - Vector2::new(du, dv)).norm() < 1e-5 * waves[family].norm());
+                assert!((wave - Vector2::new(du, dv)).norm() < 1e-5 * wave.norm());
             }
         }
         // A sphere of radius 5 m seen from 2 m: depths of 2 m and its sag of x² / 10 m.

@@ -70,6 +70,8 @@ const NORMAL_STEP: f64 = 0.19;
 const NEAR_REACH: f64 = 0.45;
 /// Shape of a cell as a pair and a plane of the grid give it: ratio of the sides and crossing angle, one standard deviation.
 const COARSE_SHAPE: (f64, f64) = (0.12, 0.21);
+/// Sides whose ratio is farther from the mesh's than this are those of another period, relative.
+const CLEAR_RATIO: f64 = 0.05;
 /// Mean log-likelihood ratio per harmonic of both families that ends the search.
 const DECISIVE: f64 = 1.8;
 
@@ -147,7 +149,8 @@ impl Search {
             }
             self.fits += 1;
             let Some(hypothesis) = refine(&field, sections, mesh, shape, Some(ray.xy())) else { continue };
-            let decisive = is_decisive(&hypothesis.evidence);
+            let ratio_off = shape_misfit(&hypothesis.field, mesh, CLEAR_RATIO, f64::INFINITY);
+            let decisive = is_decisive(&hypothesis.evidence) && ratio_off < 1.0;
             self.found.push(hypothesis);
             if decisive {
                 break;
@@ -298,6 +301,6 @@ pub(crate) fn refine(
         field = equations.solve(0.4)?;
     }
     let evidence = evidence(&field, sections, None, 4, Reading::Here);
-    let misfit = shape_misfit(&field, mesh, 5.0 * shape.sigma_ratio, shape.sigma_angle_deg.to_radians());
+    let misfit = shape_misfit(&field, mesh, 3.0 * shape.sigma_ratio, shape.sigma_angle_deg.to_radians());
     Some(Hypothesis { field, evidence, total: evidence.total() - 0.5 * misfit, residual_bins })
 }

@@ -12,7 +12,9 @@ use scene::{camera, draw, scene_of, square};
 
 fn pictures() -> Vec<Image<u8>> {
     let mut scenes = vec![Scene::empty()];
-    scenes.extend([(0.5, 0.0), (1.2, 25.0), (3.0, -15.0)].map(|(range, tilt)| scene_of(&square(), range, 5.0, tilt, 4.0)));
+    scenes.extend(
+        [(0.5, 0.0), (1.2, 25.0), (3.0, -15.0)].map(|(range, tilt)| scene_of(&square(), range, 5.0, tilt, 4.0)),
+    );
     scenes.iter().map(|scene| draw(&camera(), scene, 2).0).collect()
 }
 
