@@ -1,0 +1,113 @@
+"""The thesis's spectra on OpenCV and SciPy beside net-fft: the same pictures, the same run, one thread each.
+
+    python benches/peer/thesis.py          needs cargo; numpy, scipy, scikit-learn and opencv-python-headless
+
+Draws scenes with the simulator (`cargo run --release -p net-fft --example peer`), runs `thesis_opencv.py` on them, and prints for every
+stage the median over pictures of the best of 15 times, with the ratio, and how right the poses are: within 5 % and 5 degrees.
+"""
+
+from __future__ import annotations
+
+import collections
+import csv
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ[threads] = "1"
+try:
+    import cv2
+    import numpy as np
+    import scipy.fft
+
+    import thesis_opencv as peer
+except ImportError as missing:
+    print(f"skipped: {missing}; pip install numpy scipy scikit-learn opencv-python-headless")
+    sys.exit(0)
+
+ROOT = Path(__file__).resolve().parents[2]
+REPEATS = 15
+CELL_M = 0.05
+K = np.array([[600.0, 0, 424], [0, 600, 240], [0, 0, 1]])
+#: The thesis has no probability; its confidence is above 1 for all that it says.
+CLAIMED = 0.5
+RIGHT_PERCENT, RIGHT_DEG = 5.0, 5.0
+
+
+def best(stage) -> float:
+    """The shortest of several runs, microseconds."""
+
+    def once() -> float:
+        start = time.perf_counter()
+        stage()
+        return (time.perf_counter() - start) * 1e6
+
+    return min(once() for _ in range(REPEATS))
+
+
+def times(gray: np.ndarray) -> dict[str, float]:
+    """Of the stages that the example times too, by its names."""
+    h, w = gray.shape
+    section = gray[: h // 2, : w // 2]
+    numbers, image = gray.astype(np.float32), peer.spectrum(section)
+    return {
+        "real 2-D transform of the picture": best(lambda: scipy.fft.rfft2(numbers, workers=1)),
+        "spectrum of a section": best(lambda: peer.spectrum(section)),
+        "peaks of a section": best(lambda: peer.peaks(image)),
+        "section to scored wave vectors": best(lambda: peer.wave_vectors(peer.spectrum(section))),
+        "four sections to the plane": best(lambda: peer.sections(gray, K, CELL_M)),
+    }
+
+
+def main() -> None:
+    cv2.setNumThreads(1)
+    ours, theirs = collections.defaultdict(list), collections.defaultdict(list)
+    errors = collections.defaultdict(list)
+    with tempfile.TemporaryDirectory() as folder:
+        command = ["cargo", "run", "--quiet", "--release", "-p", "net-fft", "--example", "peer", "--", folder]
+        lines = list(csv.reader(subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.splitlines()))
+        truth = {name: np.array(rest, float) for kind, name, *rest in lines if kind == "truth"}
+
+        def score(method: str, name: str, pose) -> None:
+            """Range error, %, and normal's, degrees; None where nothing is claimed."""
+            if pose is None:
+                errors[method].append(None)
+                return
+            range_m, normal = pose
+            cosine = np.clip(normal @ truth[name][1:], -1, 1)
+            errors[method].append((100 * abs(range_m / truth[name][0] - 1), np.degrees(np.arccos(cosine))))
+
+        for kind, name, *rest in lines:
+            if kind == "time":
+                ours[rest[0]].append(float(rest[1]))
+            elif kind == "pose":
+                claimed = bool(rest[1]) and (rest[0] == "thesis" or float(rest[5]) >= CLAIMED)
+                pose = np.array(rest[1:5], float) if claimed else None
+                score(f"net-fft, {rest[0]}", name, None if pose is None else (pose[0], pose[1:]))
+        for name in truth:
+            gray = cv2.imread(str(Path(folder) / f"{name}.pgm"), cv2.IMREAD_GRAYSCALE)
+            for stage, value in times(gray).items():
+                theirs[stage].append(value)
+            found = peer.sections(gray, K, CELL_M)
+            score("OpenCV, thesis", name, None if found is None else (found[1], found[0]))
+
+    print(f"{len(truth)} pictures of 848 x 480\n\n| stage | net-fft ms | OpenCV ms | OpenCV / net-fft |\n|---|---|---|---|")
+    whole = "four sections to the plane"
+    for stage, values in ours.items():
+        us, them = np.median(values), np.median(theirs.get(stage) or theirs[whole])
+        print(f"| {stage} | {us / 1e3:.3f} | {them / 1e3:.3f} | {them / us:.1f} |")
+    print("\n| method | right | wrong | refused | range % median | normal ° median |\n|---|---|---|---|---|---|")
+    for method, all_errors in errors.items():
+        claimed = [e for e in all_errors if e is not None]
+        right = [e for e in claimed if e[0] <= RIGHT_PERCENT and e[1] <= RIGHT_DEG]
+        medians = np.median(right, axis=0) if right else (np.nan, np.nan)
+        refused = len(all_errors) - len(claimed)
+        print(f"| {method} | {len(right)} | {len(claimed) - len(right)} | {refused} | {medians[0]:.2f} | {medians[1]:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
