@@ -9,10 +9,10 @@ mod tilts;
 mod tracking;
 
 use anyhow::Result;
+use clap::ValueEnum;
 use netpose::{Config, Method};
 
 use crate::failure::Outcome;
-use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use table::Table;
 
@@ -59,14 +59,13 @@ fn columns() -> Vec<Column> {
 /// Runs the command.
 pub fn main(args: &Args) -> Result<Outcome> {
     use Experiment::{Junctions, Ranges, Tilts, Tracking};
-    let interrupt = Interrupt::listen()?;
     let columns = columns();
     for experiment in [Ranges, Tilts, Junctions, Tracking] {
         if !(args.only.is_empty() || args.only.contains(&experiment)) {
             continue;
         }
-        if interrupt.is_set() {
-            return Ok(Outcome::Partial);
+        if let Some(name) = experiment.to_possible_value() {
+            eprintln!("{} ...", name.get_name());
         }
         let tables: Vec<Table> = match experiment {
             Ranges => vec![ranges::run(&columns)?],
