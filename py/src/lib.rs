@@ -14,7 +14,7 @@ mod _core {
     #[pymodule_export]
     use crate::estimate::Estimate;
     #[pymodule_export]
-    use crate::stages::fft::{lattice_vectors, peaks, scores, spectrum};
+    use crate::stages::fft::{SectionPoses, lattice_vectors, peaks, scores, sections, spectrum};
     #[pymodule_export]
     use crate::stages::flow::{FlowResult, FlowTracker, Matches, match_points};
     #[pymodule_export]

@@ -102,6 +102,23 @@ def test_scores_name_what_is_wrong(name: str, value: float) -> None:
         npr.fft.scores(np.zeros((60, 80), np.uint8), **{name: value})  # type: ignore[arg-type]
 
 
+def test_sections_see_the_net_one_by_one(plain: npr.sim.SimFrame) -> None:
+    seen = npr.fft.sections(plain.image, plain.camera, plain.mesh)
+    count = len(seen.chosen)
+    assert count > 4 and seen.probability is not None and seen.probability > 0.5
+    assert seen.centres.shape == (count, 2) and seen.confidence.shape == (count, 2)
+    # Lattice vectors are the inverse transpose of wave vectors.
+    assert seen.basis @ seen.waves.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(2), (count, 2, 2)), abs=1e-6)
+    # A peak is read to a few hundredths of a bin, of some ten: each cell's distance is right to a few percent.
+    chosen = seen.poses[np.arange(count), seen.chosen]
+    assert plain.range_m is not None
+    assert np.median(chosen[:, 2, 3]) == pytest.approx(plain.range_m, rel=0.03)
+    water = npr.fft.sections(np.full_like(plain.image, 90), plain.camera, plain.mesh)
+    assert water.poses.shape[1:] == (2, 4, 4) and (water.probability or 0) < 0.5
+    with pytest.raises(ValueError, match="image"):
+        npr.fft.sections(plain.image[:100], plain.camera, plain.mesh)
+
+
 def test_lattice_vectors_are_dual_to_wave_vectors() -> None:
     k = np.array([[0.03, 0.004], [-0.006, 0.04]])
     assert npr.fft.lattice_vectors((0.03, 0.004), (-0.006, 0.04)) @ k.T == pytest.approx(np.eye(2))

@@ -169,6 +169,33 @@ def scores(
 ) -> npt.NDArray[np.float64]: ...
 def lattice_vectors(k1: tuple[float, float], k2: tuple[float, float]) -> npt.NDArray[np.float64]: ...
 @final
+class SectionPoses:
+    """The net as the sections of one picture see it, one by one. N is 0 where nothing is like a net."""
+
+    @property
+    def probability(self) -> float | None:
+        """That the picture shows a net and its pose is right. None if nothing was found."""
+    @property
+    def centres(self) -> npt.NDArray[np.float64]:
+        """(N, 2) pixels (u, v) of the sections' centres."""
+    @property
+    def waves(self) -> npt.NDArray[np.float64]:
+        """(N, 2, 2) the two wave vectors, rows in cycles per pixel; first the one dual to the net's X side."""
+    @property
+    def basis(self) -> npt.NDArray[np.float64]:
+        """(N, 2, 2) the two lattice vectors, rows in pixels, X side first."""
+    @property
+    def confidence(self) -> npt.NDArray[np.float64]:
+        """(N, 2) value of each vector over its rival's; inf without one."""
+    @property
+    def poses(self) -> npt.NDArray[np.float64]:
+        """(N, 2, 4, 4) both poses of one cell, net to camera, metres; the origin is on the section's central ray."""
+    @property
+    def chosen(self) -> npt.NDArray[np.int64]:
+        """(N,) which of the two has the sign of tilt that all sections agree on."""
+
+def sections(image: _Image, camera: Camera, mesh: Mesh) -> SectionPoses: ...
+@final
 class Junctions:
     """Junctions of one picture by the contours of its meshes."""
 

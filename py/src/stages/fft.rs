@@ -2,14 +2,14 @@
 
 use net_fft::{
     Bins, Ellipse, HalfSpectrum, PeakConfig, PeakFinder, ScoreConfig, SpectrumImage, SpectrumImageConfig, SpectrumPlan,
-    Window, filter_peaks, score_peaks,
+    ThesisConfig, ThesisEstimator, Window, filter_peaks, score_peaks,
 };
 use net_geometry::nalgebra::Vector2;
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::{GrayArgument, array2};
-use crate::camera::{of_argument, value_error};
+use crate::camera::{Camera, Mesh, of_argument, value_error};
 
 /// Centred log magnitude of the Hann-windowed picture, 0..255, constant bin at `(width / 2, height / 2)`.
 #[pyfunction]
@@ -119,4 +119,82 @@ pub fn lattice_vectors<'py>(py: Python<'py>, k1: (f64, f64), k2: (f64, f64)) -> 
     let b = net_geometry::Basis::from_wave_vectors(vector("k1", k1)?, vector("k2", k2)?);
     let b = b.map_err(|e| of_argument("k1, k2", e))?;
     array2(py, vec![b.b1.x, b.b1.y, b.b2.x, b.b2.y], 2, 2)
+}
+
+/// The net as the sections of one picture see it, one by one.
+#[pyclass(frozen, module = "netpose_rs.fft")]
+pub struct SectionPoses {
+    /// Of the whole picture; `None` if nothing was found.
+    #[pyo3(get)]
+    probability: Option<f64>,
+    centres: Vec<f64>,
+    waves: Vec<f64>,
+    basis: Vec<f64>,
+    confidence: Vec<f64>,
+    poses: Vec<f64>,
+    chosen: Vec<i64>,
+}
+
+#[pymethods]
+impl SectionPoses {
+    #[getter]
+    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, self.centres.clone(), self.chosen.len(), 2)
+    }
+    #[getter]
+    fn waves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.waves.to_pyarray(py).reshape([self.chosen.len(), 2, 2])
+    }
+    #[getter]
+    fn basis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        self.basis.to_pyarray(py).reshape([self.chosen.len(), 2, 2])
+    }
+    #[getter]
+    fn confidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, self.confidence.clone(), self.chosen.len(), 2)
+    }
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<f64>>> {
+        self.poses.to_pyarray(py).reshape([self.chosen.len(), 2, 4, 4])
+    }
+    #[getter]
+    fn chosen<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        self.chosen.to_pyarray(py)
+    }
+}
+
+/// Wave vectors, lattice vectors and both one-cell poses of every section that sees the net.
+#[pyfunction]
+pub fn sections(py: Python<'_>, image: &Bound<'_, PyAny>, camera: &Camera, mesh: &Mesh) -> PyResult<SectionPoses> {
+    let image = GrayArgument::new("image", image)?;
+    let view = image.view()?;
+    py.detach(|| {
+        let mut estimator = ThesisEstimator::new(&camera.inner, &mesh.inner, &ThesisConfig::default())?;
+        let probability = estimator.estimate(view)?.map(|found| found.probability);
+        let mut out = SectionPoses {
+            probability,
+            centres: Vec::new(),
+            waves: Vec::new(),
+            basis: Vec::new(),
+            confidence: Vec::new(),
+            poses: Vec::new(),
+            chosen: Vec::new(),
+        };
+        for pose in estimator.section_poses() {
+            let section = &estimator.sections()[pose.section];
+            let reduction = section.reduction as f64;
+            let size = Vector2::new(section.size.0 as f64, section.size.1 as f64) * reduction;
+            let corner = Vector2::new(section.corner.0 as f64, section.corner.1 as f64) * reduction;
+            out.centres.extend((corner + 0.5 * size).add_scalar(-0.5).iter());
+            out.waves.extend(pose.bins.iter().flat_map(|bin| [bin.x / size.x, bin.y / size.y]));
+            out.basis.extend([pose.basis.b1.x, pose.basis.b1.y, pose.basis.b2.x, pose.basis.b2.y]);
+            out.confidence.extend(pose.confidence.map(|c| c.ratio));
+            for both in &pose.poses {
+                out.poses.extend(both.pose.matrix().transpose().iter());
+            }
+            out.chosen.push(pose.chosen as i64);
+        }
+        Ok(out)
+    })
+    .map_err(|error: net_fft::Error| of_argument("image", error))
 }
