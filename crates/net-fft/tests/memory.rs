@@ -59,7 +59,7 @@ fn wrong_pictures_and_tiny_cameras_are_no_panic() {
         let found = estimator.estimate(View::packed(&constant, 848, 480).unwrap()).unwrap();
         assert!(found.is_none_or(|found| found.probability < 0.1), "a constant picture of {level}");
     }
-    for (width, height) in [(16, 9), (33, 31), (64, 2), (5, 200)] {
+    for (width, height) in [(1, 1), (1, 97), (211, 1), (2, 3), (16, 9), (33, 31), (64, 2), (5, 200), (211, 127)] {
         let camera = Camera::new(20.0, 20.0, 8.0, 4.0, width, height, Lens::None).unwrap();
         match ThesisEstimator::new(&camera, &square(), &ThesisConfig::default()) {
             Ok(mut estimator) => {
