@@ -111,7 +111,7 @@ impl Evidence {
     /// Two logistic rules, both of which must hold: coherence of fundamental and second harmonic over the picture; the same with the share
     /// of agreeing tiles about the optical axis, where the claim is made. Then the chances that the pattern is one of two families of twine,
     /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker), that tiles about the axis
-    /// agree at all, that tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were the fit's own
+    /// agree at all and strong waves elsewhere do not contradict, that tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were the fit's own
     /// standard deviation `tilt_sigma` (rad) true but for a factor.
     ///
     /// The numbers are set by hand on the simulator's studies (`net_sim::Study`) and half of a set of rendered stills; see the examples
@@ -127,7 +127,11 @@ impl Evidence {
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs.
         let limit = (0.01 + 0.2 * self.balance).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.012);
-        let agreed = logistic((self.good_near - 0.38) / 0.03);
+        // A bright tag on a net is a lattice of its own: the strong waves beside it contradict, and half of the tiles are off. Growth puts
+        // tiles off as well, but leaves their second harmonics.
+        let second = v2 / f64::sqrt(2.0 * self.tiles2.max(1) as f64);
+        let undisputed = logistic((self.good - self.dissent + 0.3 * (second.min(1.0) - 0.45) - 0.3) / 0.02);
+        let agreed = undisputed * logistic((self.good_near - 0.38) / 0.03);
         let straight = logistic((3.5 - self.bend.to_degrees()) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to twice what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (2.0 * tilt_sigma).max(1e-6)).powi(2)).exp();

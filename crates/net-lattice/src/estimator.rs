@@ -34,8 +34,8 @@ const COLD: [(f64, Model); 7] = [
 const RIVAL: [(f64, Model); 2] = [(110.0, Model::Rhomb), (250.0, Model::Quadratic)];
 /// Rival depths: scaling depth by m scales every phase by m.
 const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
-/// Share of the strongest tiles' power below which a tile's weight falls.
-const WEAK: f64 = 0.04;
+/// Weight of a tile in which next to nothing is.
+const WEAK: f64 = 0.05;
 /// Distance over which residuals of small tiles may be alike, px of an 848 x 480 px picture: three tiles.
 const REACH: f64 = 160.0;
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
@@ -240,7 +240,7 @@ impl Workspace {
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
         demodulate::<SECOND>(level, place.1, &t.map, gain, window, &mut t.sums);
-        measure(surface, &self.view, place, sign, &t.sums, &mut t.scratch, &mut t.measurements);
+        measure(surface, &self.view, place, sign, gain, &t.sums, &mut t.scratch, &mut t.measurements);
     }
 
     /// A window about the optical axis, radius in px of an 848 x 480 px picture.
@@ -277,7 +277,7 @@ impl Workspace {
                         return 0.0;
                     }
                     m.snr[f].min(60.0)
-                        * (m.share[f] / WEAK).min(1.0)
+                        * if m.empty { WEAK } else { 1.0 }
                         * window.weight(m.site.pixel)
                         * std::f64::consts::TAU.powi(2)
                 };

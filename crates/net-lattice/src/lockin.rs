@@ -34,8 +34,6 @@ pub(crate) struct Measurement {
     pub k: [f64; 2],
     /// Demodulated sums.
     pub z: [[f64; 2]; 2],
-    /// Power in the wave against that of the strongest tiles: small where the net has ended and noise is left.
-    pub share: [f64; 2],
     /// Whether it counts: enough of it shows the sheet, cells there are wider than 3 px, and it is not empty beside the others.
     pub good: bool,
     /// Next to nothing is in it.
@@ -140,23 +138,24 @@ fn wave(p: &[[f32; 4]; 4], du: f32, dv: f32) -> (f32, f32) {
     (re, im)
 }
 
-/// Quantile of the tiles that counts as the strongest.
+/// Quantile of the tiles that counts as the strongest, and as the faintest.
 const STRONG: f64 = 0.95;
-/// A tile with less than this share of the power of the strongest, whatever its phases, says nothing: open water beside the net's end.
+const FAINT: f64 = 0.05;
+/// A tile with less than this share of the power of the strongest, and less than thrice that of the faintest, says nothing, whatever its
+/// phases: open water beside the net's end. Beside a bright tag on it a net has as little of the strongest, but more than water.
 const EMPTY: f64 = 0.03;
-
-fn norm(z: [f64; 2]) -> f64 {
-    z[0] * z[0] + z[1] * z[1]
-}
+/// Power of the noise that every picture is taken to have at least: one and a half of 255 grey levels.
+const LEAST: f64 = 3.5e-5;
 
 /// Turns sums into measurements.
 ///
-/// `sign`: 1 for bright twine, -1 for dark. `scratch` is overwritten.
+/// `sign`: 1 for bright twine, -1 for dark. `gain`: that of the sums. `scratch` is overwritten.
 pub(crate) fn measure(
     surface: &Surface,
     view: &View,
     (level, tiling): (usize, usize),
     sign: f64,
+    gain: f32,
     sums: &[TileSum],
     scratch: &mut Vec<f64>,
     out: &mut Vec<Measurement>,
@@ -164,13 +163,11 @@ pub(crate) fn measure(
     let chart = surface.chart();
     let level = &view.levels[level];
     let grid = &level.tiles[tiling];
-    let mut strongest = |value: &dyn Fn(&TileSum) -> f64| {
-        scratch.clear();
-        scratch.extend(sums.iter().filter(|s| s.count > 0.0).map(value));
-        quantile(scratch, STRONG)
-    };
-    let strong = [0, 1].map(|f: usize| strongest(&|s| norm(s.z[f])).max(1e-12));
-    let busy = strongest(&|s| s.power / s.count);
+    scratch.clear();
+    scratch.extend(sums.iter().filter(|s| s.count > 0.0).map(|s| s.power / s.count));
+    let strong = EMPTY * quantile(scratch, STRONG);
+    let nothing = 3.0 * quantile(scratch, FAINT).max(LEAST * f64::from(gain).powi(2));
+    let limit = strong.min(nothing);
     out.clear();
     for (site, sum) in grid.sites.iter().zip(sums) {
         let mut m = Measurement {
@@ -181,7 +178,6 @@ pub(crate) fn measure(
             snr: [0.0; 2],
             k: [f64::INFINITY; 2],
             z: sum.z,
-            share: [0.0; 2],
             good: false,
             empty: false,
         };
@@ -191,12 +187,11 @@ pub(crate) fn measure(
             for f in 0..2 {
                 m.phase[f] = (sign * sum.z[f][1]).atan2(sign * sum.z[f][0]);
                 m.phase2[f] = (sign * sum.z2[f][1]).atan2(sign * sum.z2[f][0]);
-                m.snr[f] = norm(sum.z[f]) / (0.5 * sum.power + 1e-9);
-                m.share[f] = norm(sum.z[f]) / strong[f];
+                m.snr[f] = (sum.z[f][0].powi(2) + sum.z[f][1].powi(2)) / (0.5 * sum.power + 1e-9);
                 m.k[f] = (pu.s[f] - p.s[f]).hypot(pv.s[f] - p.s[f]);
             }
             let resolved = m.k[0].max(m.k[1]) < 1.0 / (3.0 * view.reduction as f64);
-            m.empty = sum.power < EMPTY * busy * sum.count;
+            m.empty = sum.power < limit * sum.count;
             m.good = sum.count > 0.5 * grid.area && resolved && !m.empty;
         }
         out.push(m);
