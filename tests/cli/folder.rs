@@ -34,9 +34,10 @@ fn a_folder_that_cannot_be_made_is_named() {
 #[test]
 fn a_full_disk_ends_the_run_with_the_frames_done_so_far() {
     let scratch = Scratch::new();
-    scratch.image_log(60, 48, 32);
-    // Blocks of 512 bytes in POSIX sh, of 1024 in bash: room for some rows, not for all.
-    let script = "trap '' XFSZ; ulimit -f 4; exec \"$0\" \"$@\"";
+    let all = 500;
+    scratch.image_log(all, 32, 24);
+    // Blocks of 512 bytes in POSIX sh, of 1024 in bash: room for run.json and for some rows, not for all.
+    let script = "trap '' XFSZ; ulimit -f 24; exec \"$0\" \"$@\"";
     let output = std::process::Command::new("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_netpose"), "run"])
         .arg(scratch.path("log"))
@@ -51,7 +52,7 @@ fn a_full_disk_ends_the_run_with_the_frames_done_so_far() {
     // Once there is room again, the run goes on, and nothing is missing or twice.
     assert_status(&scratch.run(&["--resume"]), 0);
     let frames: Vec<usize> = scratch.poses().iter().map(|r| r[0].parse().unwrap()).collect();
-    assert_eq!(frames, (0..60).collect::<Vec<_>>());
+    assert_eq!(frames, (0..all as usize).collect::<Vec<_>>());
 }
 
 #[test]
