@@ -107,6 +107,27 @@ fn the_same_seed_draws_the_same_log_and_mcap_holds_the_same_frames() {
 }
 
 #[test]
+fn every_net_of_a_scene_has_its_truth() {
+    let scratch = Scratch::new();
+    let output = netpose().arg("sim").arg(scratch.path("log")).args(["--scenario", "double"]).output().unwrap();
+    assert_status(&output, 0);
+    let rows = |name: &str| -> Vec<std::collections::HashMap<String, String>> {
+        csv::Reader::from_path(scratch.path("log").join(name)).unwrap().deserialize().map(Result::unwrap).collect()
+    };
+    let (nearest, all) = (rows("truth.csv"), rows("truth_layers.csv"));
+    assert_eq!(all.iter().map(|row| row["layer"].as_str()).collect::<Vec<_>>(), ["0", "1"]);
+    // The first is the one of truth.csv; the second hangs behind it.
+    assert!(nearest[0].iter().all(|(column, cell)| &all[0][column] == cell));
+    let range = |k: usize| all[k]["range_m"].parse::<f64>().unwrap();
+    assert!(range(1) > range(0) + 0.3, "{} {}", range(0), range(1));
+    // Knots of both are told apart by the same number.
+    let junctions = rows("truth_junctions.csv");
+    for layer in ["0", "1"] {
+        assert!(junctions.iter().filter(|row| row["layer"] == layer).count() > 100, "layer {layer}");
+    }
+}
+
+#[test]
 fn a_scenario_from_a_file_is_drawn_and_a_wrong_one_refused() {
     let scratch = Scratch::new();
     let file = scratch.write("mine.toml", "frames = 1\nmesh = \"30mm\"\n[camera]\nimage_width = 64\nimage_height = 48\ncx = 32.0\ncy = 24.0\nfx = 60.0\nfy = 60.0\n");

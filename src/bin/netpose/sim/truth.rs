@@ -14,6 +14,8 @@ use netpose::Pose;
 pub struct Tables {
     /// `truth.csv`: the nearest net in the columns of `poses.csv`.
     poses: PosesCsv,
+    /// `truth_layers.csv`: all nets in the same columns and the layer's number, a row for each net of a frame.
+    layers: PosesCsv,
     /// `truth_junctions.csv`: every knot in view, of every net.
     junctions: Table,
     /// `truth_missing.csv`: every broken twine in view.
@@ -23,11 +25,10 @@ pub struct Tables {
 impl Tables {
     /// New tables in `dir`.
     pub fn create(dir: &Path) -> Result<Self> {
+        let [crossing, larger, smaller] = ["crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m"];
         Ok(Self {
-            poses: PosesCsv::create(
-                &dir.join("truth.csv"),
-                &["crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m"],
-            )?,
+            poses: PosesCsv::create(&dir.join("truth.csv"), &[crossing, larger, smaller])?,
+            layers: PosesCsv::create(&dir.join("truth_layers.csv"), &[crossing, larger, smaller, "layer"])?,
             junctions: Table::create(dir, "truth_junctions.csv", "frame,layer,i,j,u,v,depth_m,visibility")?,
             missing: Table::create(dir, "truth_missing.csv", "frame,layer,i0,j0,i1,j1,u0,v0,u1,v1,stub0_m,stub1_m")?,
         })
@@ -37,6 +38,10 @@ impl Tables {
     pub fn write(&mut self, frame: u64, file: &str, timestamp_ns: i64, truth: &Truth) -> Result<()> {
         self.poses.write(&pose_row(frame, file, timestamp_ns, truth.layers.first()))?;
         for (number, layer) in truth.layers.iter().enumerate() {
+            let mut row = pose_row(frame, file, timestamp_ns, Some(layer));
+            row.appended.resize(3, f64::NAN);
+            row.appended.push(number as f64);
+            self.layers.write(&row)?;
             for node in &layer.nodes {
                 let ((i, j), (u, v)) = (node.index, (node.pixel.x, node.pixel.y));
                 let (depth, seen) = (node.depth_m, node.visibility.as_str());
