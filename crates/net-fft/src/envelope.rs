@@ -68,6 +68,11 @@ pub(crate) struct Envelopes {
 }
 
 impl Envelopes {
+    /// With room for all waves of so many sections: how many are seen changes from picture to picture.
+    pub(crate) fn with_room_for(sections: usize) -> Self {
+        Self { waves: Vec::with_capacity(sections * 2 * HARMONICS) }
+    }
+
     /// Cuts the waves of `field` out of the sections' spectra.
     pub(crate) fn extract(&mut self, field: &LatticeField, sections: &[Section]) {
         self.waves.clear();

@@ -81,11 +81,11 @@ impl ThesisEstimator {
             first_halvings,
             reduced: vec![Image::default(); first_halvings as usize + config.grids.len() - 1],
             analysers,
-            sections,
             grids,
-            search: Search::new(&config.search),
-            envelopes: Envelopes::default(),
-            poses: Vec::new(),
+            search: Search::new(&config.search, sections.len()),
+            envelopes: Envelopes::with_room_for(sections.len()),
+            poses: Vec::with_capacity(sections.len()),
+            sections,
         })
     }
 

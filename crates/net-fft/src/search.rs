@@ -111,7 +111,7 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    pub(crate) fn new(config: &SearchConfig) -> Self {
+    pub(crate) fn new(config: &SearchConfig, sections: usize) -> Self {
         let mut normals = vec![Vector3::z()];
         let rings = (config.max_tilt_deg.to_radians() / NORMAL_STEP) as usize;
         for ring in 1..=rings {
@@ -123,7 +123,15 @@ impl Search {
                 normals.push(Vector3::new(tilt.sin() * azimuth.cos(), tilt.sin() * azimuth.sin(), tilt.cos()));
             }
         }
-        Self { normals, ..Self::default() }
+        let candidates = config.candidates_per_section.min(64);
+        Self {
+            normals,
+            own: Vec::with_capacity(candidates * candidates / 2),
+            pairs: Vec::with_capacity(sections * config.pairs_per_section.min(64)),
+            planes: Vec::with_capacity(2 * config.pairs.min(1024)),
+            found: Vec::with_capacity(config.fits.min(64) + 4),
+            ..Self::default()
+        }
     }
 
     /// All lattices that were fitted, best first.
