@@ -56,6 +56,11 @@ pub struct Peak {
     pub level: f64,
 }
 
+/// Room for the peaks of a spectrum of this size: local maxima of blurred bins are no denser than one in eight.
+pub(crate) fn peaks_at_most(width: usize, height: usize) -> usize {
+    (width * height).div_ceil(8)
+}
+
 /// Algorithm 2 with its buffers.
 #[derive(Debug, Clone, Default)]
 pub struct PeakFinder {
@@ -88,7 +93,18 @@ impl PeakFinder {
                 *to = u8::from(here == max) & u8::from(max - min > threshold) & u8::from(here >= lowest);
             }
         }
+        // The most there can be, give or take a plateau: how many there are changes from picture to picture.
+        let room = peaks_at_most(width, height);
         self.peaks.clear();
+        self.peaks.reserve(room);
+        self.points.clear();
+        self.points.reserve(room);
+        self.labels.clear();
+        self.labels.reserve(room);
+        self.strongest.clear();
+        self.strongest.reserve(room);
+        self.stack.clear();
+        self.stack.reserve(room);
         let origin = Vector2::new(constant_bin.0 as f64, constant_bin.1 as f64);
         for v in 0..height {
             let row = v * width..(v + 1) * width;

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::fft2::HalfSpectrum;
 use crate::filter::{Ellipse, FallingThreshold, FilterConfig, filter_peaks};
 use crate::flatten::Flattener;
-use crate::peaks::{Peak, PeakConfig, PeakFinder};
+use crate::peaks::{Peak, PeakConfig, PeakFinder, peaks_at_most};
 use crate::score::{Candidate, ScoreConfig, score_peaks};
 use crate::spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};
 
@@ -175,7 +175,15 @@ impl SectionAnalyser {
         let constant_bin = out.constant_bin;
         // A picture has at least one pixel, and so has its spectrum.
         let Some(levels) = out.levels.view() else { return Ok(()) };
+        let room = peaks_at_most(levels.width(), levels.height());
         out.all_peaks.clear();
+        out.all_peaks.reserve(room);
+        out.peaks.clear();
+        out.peaks.reserve(room);
+        out.candidates.clear();
+        out.candidates.reserve(room.min(config.score.max_peaks));
+        self.order.clear();
+        self.order.reserve(room);
         out.all_peaks.extend_from_slice(self.finder.find(levels, constant_bin, &config.peaks));
         let highest = self.finder.maximum();
         out.highest.resize(highest.width(), highest.height());
