@@ -12,6 +12,8 @@ use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
 use netpose::Tracker;
 
+use super::nodes::Nodes;
+
 /// The columns of `count.csv`.
 pub const HEADER: [&str; 8] = ["frame", "track", "stretch", "offset_i", "offset_j", "verdict", "z", "sure"];
 
@@ -73,10 +75,11 @@ impl Count {
         track: u32,
         image: GrayView<'_>,
         tracker: &Tracker,
+        nodes: &Nodes,
     ) -> Result<Option<Counted>> {
         let Some(axis) = tracker.lattice_at_axis().filter(|a| a.amax() < 1e8) else { return Ok(None) };
         let middle = (axis.x.round() as i32, axis.y.round() as i32);
-        self.step(frame, track, middle, image, |at| tracker.pixel_from_lattice(at).map(|(pixel, _)| pixel)).map(Some)
+        self.step(frame, track, middle, image, |at| nodes.pixel(at)).map(Some)
     }
 
     fn step(

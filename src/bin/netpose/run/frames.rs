@@ -12,6 +12,7 @@ use netpose::{Camera, Config, Error, Mesh, NetPose, Status, Tracker};
 use super::ahead::in_order;
 use super::count::{self, Count};
 use super::folder::{Ended, Finished, Folder};
+use super::nodes::Nodes;
 use super::overlays::Overlays;
 use crate::draw::{Overlay, Shown};
 use crate::interrupt::Interrupt;
@@ -110,11 +111,13 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
             folder.write(&frame, time, tracked.as_ref().map_err(String::as_str))?;
             match (&tracked, image) {
                 (Ok(tracked), Ok(image)) => {
-                    if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view())
-                        && let Some(counted) = count.update(frame.index, tracked.track, view, &tracker)?
-                        && let Some(map) = &mut map
-                    {
-                        map.add(&counted, view, &tracker, &tracked.twines)?;
+                    if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view()) {
+                        let nodes = Nodes::new(&tracked.junctions, |at| Some(tracker.pixel_from_lattice(at)?.0));
+                        if let Some(counted) = count.update(frame.index, tracked.track, view, &tracker, &nodes)?
+                            && let Some(map) = &mut map
+                        {
+                            map.add(&counted, view, &tracker, &nodes, &tracked.twines)?;
+                        }
                     }
                     folder.consider(frame.index, &image, tracked);
                     if let Some(overlays) = &mut overlays {

@@ -5,6 +5,7 @@ mod count;
 mod examples;
 mod folder;
 mod frames;
+mod nodes;
 mod overlays;
 
 use std::num::NonZeroU64;
@@ -19,6 +20,7 @@ use crate::interrupt::Interrupt;
 use crate::options::Setup;
 pub use count::{Counted, HEADER as COUNT_HEADER};
 use folder::{Existing, Folder};
+pub use nodes::Nodes;
 
 /// Where the net is, frame by frame, in a log of images.
 #[derive(Debug, clap::Args)]
