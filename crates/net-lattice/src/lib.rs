@@ -14,6 +14,9 @@
 //! 8. `fold`: all cells on top of each other; the average cell must look like two crossing twines.
 //! 9. `decision`, `covariance`: a probability from statistics that the fit cannot raise, and errors that grow when the model does not fit.
 //!
+//! `estimator` is the door; `cold` and `follow` put the stages together for a first and for a next picture, `conclude` ends both; `workspace`
+//! is what they share.
+//!
 //! # Conventions
 //! Frames, pixels and units are those of [`net_geometry`]. Lattice coordinates are in cells. Of a bent net the pose is that of the tangent
 //! plane at the optical axis.
@@ -38,6 +41,8 @@
 // Dense matrix code reads best with its indices.
 #![allow(clippy::needless_range_loop)]
 
+mod cold;
+mod conclude;
 mod config;
 mod covariance;
 mod decision;
@@ -46,6 +51,7 @@ mod estimate;
 mod estimator;
 mod fit;
 mod fold;
+mod follow;
 mod likelihood;
 mod lockin;
 mod map;
@@ -59,6 +65,7 @@ mod spectra;
 mod surface;
 mod template;
 mod view;
+mod workspace;
 
 pub use config::Config;
 pub use decision::Evidence;

@@ -1,0 +1,171 @@
+//! Cold start: candidates of the search locked to the picture, the best one's true cell, the model that the tiles support.
+
+use crate::config::Config;
+use crate::decision::Evidence;
+use crate::estimate::LatticeEstimate;
+use crate::likelihood::Polarity;
+use crate::lockin::Window;
+use crate::model::{self, Model};
+use crate::search::{self, Candidate};
+use crate::surface::Surface;
+use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
+
+/// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
+const COLD: [(f64, Model); 7] = [
+    (90.0, Model::Rhomb),
+    (160.0, Model::Rhomb),
+    (250.0, Model::Quadratic),
+    (400.0, Model::Cubic),
+    (700.0, Model::Quartic),
+    (2000.0, Model::Quartic),
+    (2000.0, Model::Quartic),
+];
+/// The short lock-in of a rival period.
+const RIVAL: [(f64, Model); 2] = [(110.0, Model::Rhomb), (250.0, Model::Quadratic)];
+/// Rival depths: scaling depth by m scales every phase by m.
+const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Candidates of the search that are locked to: at least the first number, more while none is coherent.
+const CANDIDATES: (usize, usize) = (3, 8);
+
+impl Workspace {
+    pub(crate) fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
+        self.search();
+        let mut locks: Vec<Lock> = Vec::new();
+        for k in 0..self.candidates.len().min(CANDIDATES.1) {
+            let c = self.candidates[k];
+            if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
+                break;
+            }
+            let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
+            let Some(surface) = self.lock(&start, &COLD, true) else { continue };
+            self.measure::<false>(&surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
+            let evidence = Evidence::new(&self.tools.measurements);
+            let level = self.view.level_for(self.short_px(surface.depth), 12.0);
+            let cell = self.cell_px(surface.depth);
+            let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
+            locks.push(Lock { surface, evidence, gain, polarity, blur });
+            // Nearly every tile agrees: other candidates could only be other periods, which are tested below.
+            let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
+            if coherence > 0.8 && evidence.good > 0.9 {
+                break;
+            }
+        }
+        let lock = self.best_lock(locks)?;
+        let (lock, margin) = self.true_cell(lock)?;
+        self.finish(config, lock, margin)
+    }
+    fn search(&mut self) {
+        let mut found = Vec::new();
+        let mut refined: Vec<Candidate> = Vec::new();
+        for (bank, search) in &mut self.banks {
+            self.spectra.compute(&self.view, bank, &mut self.tools.smoother);
+            found.clear();
+            search.run(bank, &self.scope, 6, &mut found);
+            let scale = self.view.levels[bank.level].scale;
+            found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
+            let range = search.depths_m(self.scope.sides[0]);
+            search::add_rivals(bank, scale, &self.scope, range, &mut found);
+            refined.append(&mut found);
+        }
+        search::distinct(&mut refined);
+        self.candidates = refined;
+    }
+
+    /// Gain decides between periods, coherence between candidates of the same period: a cycle slip at the rim costs coherence, hardly gain.
+    fn best_lock(&self, mut locks: Vec<Lock>) -> Option<Lock> {
+        let v = |l: &Lock| l.evidence.v[0].abs().min(l.evidence.v[1].abs());
+        let score = |l: &Lock| l.gain * if v(l) > 3.5 { 1.0 } else { 0.05 };
+        locks.sort_by(|a, b| score(b).total_cmp(&score(a)));
+        let top = *locks.first()?;
+        let same =
+            locks.iter().filter(|l| (l.surface.depth / top.surface.depth).ln().abs() < 0.06 && l.gain > 0.6 * top.gain);
+        let coherence = |l: &Lock| v(l) + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());
+        same.max_by(|a, b| coherence(a).total_cmp(&coherence(b))).copied()
+    }
+
+    /// Tests the rival periods; returns the best, and the share of its gain by which the second falls short.
+    fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64)> {
+        let cell = self.short_px(lock.surface.depth);
+        let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
+        let possible =
+            |m: &f64| *m == 1.0 || (cell / m > SMALLEST_CELL * 0.9 * self.view.reduction as f64 && cell / m < span);
+        let rivals: Vec<f64> = RIVALS.into_iter().filter(possible).collect();
+        let (first, last) = (*rivals.first()?, *rivals.last()?);
+        let widest = self.cell_px(lock.surface.depth * first);
+        let level = self.view.level_for(cell / last, 6.0);
+        let mut all: Vec<(f64, f64, Lock)> = Vec::new();
+        let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
+        for m in rivals {
+            let surface = if m == 1.0 {
+                lock.surface
+            } else {
+                let Some(s) = self.lock(&lock.surface.scaled(m), &RIVAL, true) else { continue };
+                let v = Evidence::new(&self.tools.measurements).v;
+                // Waves of that period are not there at all.
+                if v[0].min(v[1]) < 1.0 {
+                    continue;
+                }
+                s
+            };
+            let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
+            // A lattice of which only every second or third line is there draws most of the picture, too.
+            let scale = self.view.levels[level].scale;
+            let (short, t) = (self.short_px(surface.depth) / scale, &mut self.tools);
+            let fold = t.folder.fold(&self.view.levels[level], &t.map, t.high[level].1, short);
+            let all_there = 1.0 - (2.0 * fold.unlike).min(1.0);
+            all.push((
+                gain * if gain > 0.0 { all_there } else { 1.0 },
+                m,
+                Lock { surface, gain, polarity, blur, ..lock },
+            ));
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (gain, m, mut best) = *all.first()?;
+        let second = all.get(1).map_or(0.0, |a| a.0);
+        if m != 1.0
+            && let Some(s) = self.lock(&best.surface, &COLD[2..], false)
+        {
+            best.surface = s;
+        }
+        if best.polarity == Polarity::Dark {
+            best.surface.offset.iter_mut().for_each(|o| *o += 0.5);
+        }
+        self.seat_families(&mut best, level, widest);
+        Some((best, (gain - second) / gain.abs().max(1e-9)))
+    }
+
+    /// One family can sit half a cell off when the other decided the polarity: the drawing tells.
+    fn seat_families(&mut self, best: &mut Lock, level: usize, widest: f64) {
+        self.high(level, widest);
+        let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
+        drawing.sparse = true;
+        let mut top = (f64::NEG_INFINITY, best.surface);
+        for shift in [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]] {
+            let mut surface = best.surface;
+            surface.offset[0] += shift[0];
+            surface.offset[1] += shift[1];
+            let t = &mut self.tools;
+            t.map.fill(&surface, &self.view.levels[level]);
+            let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother);
+            if gain > top.0 {
+                top = (gain, surface);
+            }
+        }
+        best.surface = top.1;
+    }
+
+    /// Refines a lock on the drawing, chooses the model, and says what is known of the result.
+    fn finish(&mut self, config: &Config, lock: Lock, margin: f64) -> Option<LatticeEstimate> {
+        let mut surface = lock.surface;
+        let mut model = Model::Bent;
+        if let Some((fit, _)) = self.likelihood(&surface, &lock, model, 3) {
+            surface = fit.surface;
+            let t = &mut self.tools;
+            if let Some(choice) = model::choose(&mut t.fitter, &surface, &t.observations, &self.prior, Model::Bent) {
+                surface = choice.fit.surface;
+                model = choice.model;
+            }
+        }
+        self.conclude(config, &surface, &lock, model, 2, margin, None)
+    }
+}

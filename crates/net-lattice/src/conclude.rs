@@ -1,0 +1,155 @@
+//! The end of every picture: last passes on the drawing, evidence, covariance, and the result in the net frame.
+
+use net_geometry::Plane;
+use net_geometry::nalgebra::Vector3;
+
+use crate::config::Config;
+use crate::covariance;
+use crate::decision::Evidence;
+use crate::estimate::{Labels, LatticeEstimate};
+use crate::lockin::Window;
+use crate::model::{self, Model};
+use crate::surface::Surface;
+use crate::workspace::{Lock, Workspace};
+
+/// Distance over which residuals of small tiles may be alike, px of an 848 x 480 px picture: three tiles.
+const REACH: f64 = 160.0;
+
+impl Workspace {
+    /// Last passes on the drawing with the chosen model, evidence, covariance, and the result in the net frame.
+    pub(crate) fn conclude(
+        &mut self,
+        config: &Config,
+        surface: &Surface,
+        lock: &Lock,
+        model: Model,
+        passes: usize,
+        margin: f64,
+        labels: Option<Labels>,
+    ) -> Option<LatticeEstimate> {
+        let (fit, robust) = self.likelihood(surface, lock, model, passes)?;
+        let surface = fit.surface;
+        let labels = labels.unwrap_or_else(|| cold_labels(&surface));
+        let count = model.parameters();
+        let reach =
+            REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
+        let t = &mut self.tools;
+        let scale = model::robust_scale(&t.fitter.whitened(&t.observations));
+        let c = covariance::parameters(
+            &t.fitter,
+            &surface,
+            &t.observations,
+            robust,
+            &fit.covariance,
+            count,
+            scale,
+            config.side_ratio_sigma,
+            reach,
+            &mut t.scores,
+        );
+        let errors = covariance::pose(&surface, &labels, &c, count);
+        let place = self.scale_for(surface.depth);
+        self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
+        let evidence = Evidence::new(&self.tools.measurements).near(&self.tools.measurements, self.window(220.0));
+        let mean_plane = self.mean_plane(&surface);
+        let cell = self.short_px(surface.depth) / self.view.levels[place.0].scale;
+        let t = &mut self.tools;
+        let evidence = evidence.folded(t.folder.fold(&self.view.levels[place.0], &t.map, t.high[place.0].1, cell));
+        let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
+        let odd = labels.turns % 2 == 1;
+        Some(LatticeEstimate {
+            pose: labels.pose(&surface),
+            covariance: errors.pose,
+            range: surface.depth,
+            range_sigma: errors.range,
+            tilt_sigma: errors.tilt,
+            xy_sigma: errors.xy,
+            mean_plane,
+            crossing_angle: if odd { std::f64::consts::PI - surface.angle } else { surface.angle },
+            crossing_angle_sigma: errors.angle,
+            curvatures: curvatures(&surface),
+            sides: if odd { [surface.sides[1], surface.sides[0]] } else { surface.sides },
+            probability: evidence.probability(errors.tilt),
+            evidence,
+            gain: lock.gain / (self.view.levels[0].raw.data().len() as f64),
+            margin,
+            model,
+            polarity: lock.polarity,
+            blur: lock.blur,
+            surface,
+            labels,
+        })
+    }
+    /// Mean plane of the sheet within 220 px (848 x 480 px) of the axis.
+    fn mean_plane(&self, surface: &Surface) -> Plane {
+        let tangent = Plane { normal: surface.normal(), distance: surface.depth * surface.rotation[(2, 2)] };
+        if surface.height.iter().all(|c| *c == 0.0) {
+            return tangent;
+        }
+        let chart = surface.chart();
+        let mut points: Vec<Vector3<f64>> = Vec::new();
+        for site in &self.view.levels[0].tiles[0].sites {
+            let (u, v) = (site.pixel[0] - self.view.centre[0], site.pixel[1] - self.view.centre[1]);
+            if !site.valid || u.hypot(v) > 220.0 * self.view.size {
+                continue;
+            }
+            if let Some(p) = chart.at(site.ray[0], site.ray[1]) {
+                points.push(Vector3::new(site.ray[0], site.ray[1], 1.0) * p.depth);
+            }
+        }
+        if points.len() < 6 {
+            return tangent;
+        }
+        let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+        let mut scatter = net_geometry::nalgebra::Matrix3::zeros();
+        for p in &points {
+            scatter += (p - mean) * (p - mean).transpose();
+        }
+        let eigen = scatter.symmetric_eigen();
+        let mut normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        if normal.z < 0.0 {
+            normal = -normal;
+        }
+        Plane { normal, distance: normal.dot(&mean) }
+    }
+}
+
+/// X nearest to the image's u axis, origin at the node nearest to the optical axis.
+fn cold_labels(surface: &Surface) -> Labels {
+    let d = 0.5 * (std::f64::consts::FRAC_PI_2 - surface.angle);
+    let (sd, cd) = d.sin_cos();
+    let (e1, e2) = (surface.rotation.column(0), surface.rotation.column(1));
+    let u1 = e1[0] * cd + e2[0] * sd;
+    let u2 = e1[0] * sd + e2[0] * cd;
+    let turns = if u1.abs() >= u2.abs() {
+        if u1 >= 0.0 { 0 } else { 2 }
+    } else if u2 >= 0.0 {
+        1
+    } else {
+        3
+    };
+    // In a rhomb the nearest node need not be the one whose coordinates round to it.
+    let base = [surface.offset[0].round(), surface.offset[1].round()];
+    let mut best = (f64::INFINITY, base);
+    for i in -1..=1 {
+        for j in -1..=1 {
+            let node = [base[0] + f64::from(i), base[1] + f64::from(j)];
+            let p = (node[0] - surface.offset[0]) * surface.sides[0];
+            let q = (node[1] - surface.offset[1]) * surface.sides[1];
+            let distance = p * p + q * q + 2.0 * p * q * surface.angle.cos();
+            if distance < best.0 - 1e-15 {
+                best = (distance, node);
+            }
+        }
+    }
+    Labels { turns, origin: best.1 }
+}
+
+/// Principal curvatures on the axis, larger magnitude first. The normal points away from the camera, so a positive height is farther away.
+fn curvatures(surface: &Surface) -> [f64; 2] {
+    let [a, b, c] = [surface.height[0], surface.height[1], surface.height[2]];
+    let mean = 0.5 * (a + c);
+    let half = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+    let (p, q) = (mean + half, mean - half);
+    if p.abs() >= q.abs() { [p, q] } else { [q, p] }
+}

@@ -1,0 +1,34 @@
+//! The next picture of a sequence: the last sheet moved as predicted, locked to and refined.
+
+use net_geometry::Pose;
+
+use crate::config::Config;
+use crate::estimate::LatticeEstimate;
+use crate::likelihood::Polarity;
+use crate::model::Model;
+use crate::workspace::{Lock, Workspace};
+
+impl Workspace {
+    /// The sheet of the last picture, moved as predicted, locked and refined.
+    pub(crate) fn follow(&mut self, config: &Config, predicted: &Pose) -> Option<LatticeEstimate> {
+        let last = self.last?;
+        let turn = predicted.rotation * last.pose.rotation.inverse();
+        let shift = predicted.translation - turn * last.pose.translation;
+        let start = last.surface.seen_from(turn.matrix(), &shift)?;
+        // Half a cell lies between the lock-in's zero and dark twine's drawing.
+        let half = if last.polarity == Polarity::Dark { 0.5 } else { 0.0 };
+        let mut surface = start;
+        surface.offset = start.offset.map(|o| o - half);
+        let model = last.model.max(Model::Rhomb);
+        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], false)?;
+        surface.offset = surface.offset.map(|o| o + half);
+        let lock = Lock {
+            surface,
+            evidence: last.evidence,
+            gain: last.gain * self.view.levels[0].raw.data().len() as f64,
+            polarity: last.polarity,
+            blur: last.blur,
+        };
+        self.conclude(config, &surface, &lock, last.model, 1, last.margin, Some(last.labels))
+    }
+}

@@ -1,0 +1,279 @@
+//! What the stages of an estimator share: the pyramid, plans, buffers, and the steps that both a cold start and a followed picture take.
+
+use net_geometry::{Camera, Mesh};
+use net_image::GrayView;
+
+use crate::config::Config;
+use crate::decision::Evidence;
+use crate::estimate::Followed;
+use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
+use crate::fold::Folder;
+use crate::likelihood::{Drawing, Likelihood, Polarity};
+use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
+use crate::map::PhaseMap;
+use crate::model::Model;
+use crate::numeric::magnitude_quantile;
+use crate::search::{Candidate, Scope, Search};
+use crate::smooth::Smoother;
+use crate::spectra::{Bank, Spectra};
+use crate::surface::{self, Params, Surface};
+use crate::view::View;
+
+/// Weight of a tile in which next to nothing is.
+const WEAK: f64 = 0.05;
+/// Smallest cell, full-resolution px on the axis, that is looked for.
+pub(crate) const SMALLEST_CELL: f64 = 3.7;
+
+#[derive(Debug)]
+pub(crate) struct Workspace {
+    pub view: View,
+    pub banks: Vec<(Bank, Search)>,
+    pub spectra: Spectra,
+    pub tools: Tools,
+    pub scope: Scope,
+    pub prior: Prior,
+    pub candidates: Vec<Candidate>,
+    /// Twine diameter, m.
+    pub twine: f64,
+    /// What the next picture starts from.
+    pub last: Option<Followed>,
+}
+
+/// Buffers that the stages share.
+#[derive(Debug, Default)]
+pub(crate) struct Tools {
+    pub smoother: Smoother,
+    pub map: PhaseMap,
+    pub sums: Vec<TileSum>,
+    pub measurements: Vec<Measurement>,
+    pub observations: Vec<Observation>,
+    pub fitter: Fitter,
+    pub likelihood: Likelihood,
+    pub histogram: Vec<u32>,
+    pub scratch: Vec<f64>,
+    pub scores: Vec<(usize, Params)>,
+    pub folder: Folder,
+    /// What `high` of each level holds: filter length, and the gain of the lock-in.
+    pub high: [(f64, f32); 4],
+}
+
+/// A locked candidate.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lock {
+    pub surface: Surface,
+    pub evidence: Evidence,
+    pub gain: f64,
+    pub polarity: Polarity,
+    pub blur: f64,
+}
+
+impl Workspace {
+    pub(crate) fn new(camera: &Camera, mesh: &Mesh, config: &Config, view: View) -> Self {
+        let mut banks = Vec::new();
+        let reduction = view.reduction as f64;
+        // Tiles of 160 px for cells up to 60 px, of 360 px for those up to 136 px (848 x 480 px).
+        for (half, length, columns, rows, smooth) in [(0, 160.0, 9, 5, 25.0), (1, 360.0, 5, 2, 60.0)] {
+            let level = half.min(view.levels.len() - 1);
+            let scale = view.levels[level].scale;
+            let tile = length * view.size / scale;
+            if let Some(bank) = Bank::new(camera, &view, level, tile, columns, rows, smooth * view.size) {
+                let side = bank.length as f64 * scale;
+                let smallest = if half == 0 { SMALLEST_CELL * reduction } else { 0.075 * side };
+                let largest = 0.378 * side;
+                if largest > 1.3 * smallest {
+                    let search = Search::new(&view, &bank, smallest, largest);
+                    banks.push((bank, search));
+                }
+            }
+        }
+        Self {
+            scope: Scope {
+                sides: [mesh.side1(), mesh.side2()],
+                angle: mesh.angle(),
+                angle_sigma: config.crossing_angle_sigma_deg.to_radians(),
+            },
+            prior: Prior { sigma: surface::prior(config), angle: mesh.angle() },
+            banks,
+            spectra: Spectra::new(),
+            tools: Tools::default(),
+            candidates: Vec::new(),
+            twine: config.twine_diameter_m,
+            last: None,
+            view,
+        }
+    }
+
+    pub(crate) fn load(&mut self, image: GrayView<'_>) {
+        self.view.load(image);
+        self.tools.high = [(0.0, 0.0); 4];
+    }
+
+    /// Full-resolution px of a cell (geometric mean of the sides) on the axis.
+    pub(crate) fn cell_px(&self, depth: f64) -> f64 {
+        self.view.focal * (self.scope.sides[0] * self.scope.sides[1]).sqrt() / depth
+    }
+
+    /// The shorter side in full-resolution px.
+    pub(crate) fn short_px(&self, depth: f64) -> f64 {
+        self.view.focal * self.scope.sides[0].min(self.scope.sides[1]) / depth
+    }
+
+    /// Makes sure that `high` of a level is filtered for cells of `cell` px; returns the lock-in's gain.
+    pub(crate) fn high(&mut self, level: usize, cell: f64) -> f32 {
+        let sigma = self.view.high_pass_px(cell);
+        let t = &mut self.tools;
+        if (t.high[level].0 / sigma - 1.0).abs() > 0.02 {
+            self.view.high_pass(level, sigma, &mut t.smoother);
+            let high = self.view.levels[level].high.data();
+            let q = magnitude_quantile(high.iter().copied(), 0.97, &mut t.histogram);
+            t.high[level] = (sigma, 1.0 / (q + 1e-9));
+        }
+        t.high[level].1
+    }
+
+    /// Level and tiling of the lock-in for a depth.
+    pub(crate) fn scale_for(&self, depth: f64) -> (usize, usize) {
+        (self.view.level_for(self.short_px(depth), 12.0), self.view.tiling_for(self.cell_px(depth)))
+    }
+
+    /// One lock-in at the predicted sheet.
+    pub(crate) fn measure<const SECOND: bool>(
+        &mut self,
+        surface: &Surface,
+        place: (usize, usize),
+        sign: f64,
+        window: &Window,
+    ) {
+        let gain = self.high(place.0, self.cell_px(surface.depth));
+        let t = &mut self.tools;
+        let level = &self.view.levels[place.0];
+        t.map.fill(surface, level);
+        demodulate::<SECOND>(level, place.1, &t.map, gain, window, &mut t.sums);
+        measure(surface, &self.view, place, sign, gain, &t.sums, &mut t.scratch, &mut t.measurements);
+    }
+
+    /// A window about the optical axis, radius in px of an 848 x 480 px picture.
+    pub(crate) fn window(&self, radius: f64) -> Window {
+        Window { centre: self.view.centre, radius: radius * self.view.size }
+    }
+
+    /// Lock-in and fit with a growing window. The measurements left behind are those of the last pass, before its step.
+    pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], fresh: bool) -> Option<Surface> {
+        let mut surface = *start;
+        let place = self.scale_for(surface.depth);
+        if fresh {
+            surface.offset = [0.0; 2];
+            let window = self.window(110.0);
+            self.measure::<false>(&surface, (place.0, 0), 1.0, &window);
+            for f in 0..2 {
+                let mut sum = [0.0; 2];
+                for m in self.tools.measurements.iter().filter(|m| m.good) {
+                    let w = window.weight(m.site.pixel);
+                    sum[0] += w * m.z[f][0];
+                    sum[1] += w * m.z[f][1];
+                }
+                surface.offset[f] = sum[1].atan2(sum[0]) / std::f64::consts::TAU;
+            }
+        }
+        for &(radius, model) in schedule {
+            let window = self.window(radius);
+            self.measure::<false>(&surface, place, 1.0, &window);
+            let t = &mut self.tools;
+            t.observations.clear();
+            for m in &t.measurements {
+                let w = |f: usize| {
+                    if !m.good || m.snr[f] <= 3.0 {
+                        return 0.0;
+                    }
+                    m.snr[f].min(60.0)
+                        * if m.empty { WEAK } else { 1.0 }
+                        * window.weight(m.site.pixel)
+                        * std::f64::consts::TAU.powi(2)
+                };
+                let s = |f: usize| m.predicted.s[f] + m.phase[f] / std::f64::consts::TAU;
+                t.observations.push(Observation { site: m.site, s: [s(0), s(1)], weight: [w(0), 0.0, w(1)] });
+            }
+            let robust = Robust::Family(0.6 / std::f64::consts::TAU);
+            surface = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?.surface;
+        }
+        Some(surface)
+    }
+
+    /// How to draw and compare a net at `depth` on `level`, high-passed for cells of `cell` px.
+    pub(crate) fn drawing(&self, level: usize, cell: f64, polarity: Polarity, blur_px: f64) -> Drawing {
+        let scale = self.view.levels[level].scale;
+        // The average over a level's pixel adds its own blur.
+        let own = (1.0 - 1.0 / (scale * scale)).max(0.0) / 12.0;
+        Drawing {
+            polarity,
+            blur: ((blur_px / scale).powi(2) + own).sqrt(),
+            offset: 0.0,
+            contrast_length: (36.0 * self.view.size).max(0.8 * cell) / scale,
+            high_pass: self.view.high_pass_px(cell) / scale,
+            sparse: false,
+        }
+    }
+
+    /// Best gain of the drawing over polarities and blurs (px), every second block compared. Dark twine is the lattice half a cell off
+    /// with the opposite sign: the lock-in cannot tell it from bright twine, the drawing can.
+    pub(crate) fn gain(
+        &mut self,
+        surface: &Surface,
+        level: usize,
+        cell: f64,
+        polarities: &[Polarity],
+        blurs: &[f64],
+    ) -> (f64, Polarity, f64) {
+        self.high(level, cell);
+        let area = self.view.levels[level].scale.powi(2);
+        let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
+        self.tools.map.fill(surface, &self.view.levels[level]);
+        self.tools.likelihood.load(&self.view.levels[level]);
+        self.tools.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
+        for &blur in blurs {
+            for &polarity in polarities {
+                let mut drawing = self.drawing(level, cell, polarity, blur);
+                drawing.sparse = true;
+                drawing.offset = if polarity == Polarity::Dark { 0.5 } else { 0.0 };
+                let t = &mut self.tools;
+                let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother) * area;
+                if gain > best.0 {
+                    best = (gain, polarity, blur);
+                }
+            }
+        }
+        best
+    }
+    /// Refines on the drawing: one shift per tile and pass, the sheet fitted to those.
+    pub(crate) fn likelihood(
+        &mut self,
+        surface: &Surface,
+        lock: &Lock,
+        model: Model,
+        passes: usize,
+    ) -> Option<(Fit, Robust)> {
+        let cell = self.cell_px(surface.depth);
+        let level = self.view.level_for(self.short_px(surface.depth), 20.0);
+        let tiling = self.view.tiling_for(cell);
+        self.high(level, cell);
+        let drawing = self.drawing(level, cell, lock.polarity, lock.blur);
+        let t = &mut self.tools;
+        let view = &self.view.levels[level];
+        t.likelihood.load(view);
+        t.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
+        let mut fit = None;
+        let mut surface = *surface;
+        for _ in 0..passes {
+            t.map.fill(&surface, view);
+            t.likelihood.observe(&surface, &t.map, &drawing, &view.tiles[tiling], &mut t.smoother, &mut t.observations);
+            let mut shifts: Vec<f64> =
+                t.likelihood.shifts.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
+            let scale = (3.0 * 1.4826 * crate::numeric::median(&mut shifts)).max(0.01);
+            let robust = Robust::Tile(scale);
+            let done = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?;
+            surface = done.surface;
+            fit = Some((done, robust));
+        }
+        fit
+    }
+}
