@@ -7,6 +7,7 @@ use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
 use crate::search::{self, Candidate};
+use crate::stages::Stages;
 use crate::surface::Surface;
 use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
 
@@ -43,7 +44,7 @@ impl Workspace {
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
             let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
-            locks.push(Lock { surface, evidence, gain, polarity, blur });
+            locks.push(Lock { surface, start, evidence, gain, polarity, blur });
             // Nearly every tile agrees: other candidates could only be other periods, which are tested below.
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
             if coherence > 0.8 && evidence.good > 0.9 {
@@ -52,6 +53,7 @@ impl Workspace {
         }
         let lock = self.best_lock(locks)?;
         let (lock, margin) = self.true_cell(lock)?;
+        self.stages = Some(Stages::new(&lock));
         self.finish(config, lock, margin)
     }
     fn search(&mut self) {
@@ -116,7 +118,7 @@ impl Workspace {
             all.push((
                 gain * if gain > 0.0 { all_there } else { 1.0 },
                 m,
-                Lock { surface, gain, polarity, blur, ..lock },
+                Lock { surface, start: lock.start.scaled(m), gain, polarity, blur, ..lock },
             ));
         }
         all.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -115,7 +115,7 @@ impl Workspace {
 }
 
 /// X nearest to the image's u axis, origin at the node nearest to the optical axis.
-fn cold_labels(surface: &Surface) -> Labels {
+pub(crate) fn cold_labels(surface: &Surface) -> Labels {
     let d = 0.5 * (std::f64::consts::FRAC_PI_2 - surface.angle);
     let (sd, cd) = d.sin_cos();
     let (e1, e2) = (surface.rotation.column(0), surface.rotation.column(1));

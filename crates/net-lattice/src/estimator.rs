@@ -16,7 +16,7 @@ pub struct LatticeEstimator {
     mesh: Mesh,
     config: Config,
     /// `None` when the picture is too small for a lattice.
-    work: Option<Workspace>,
+    pub(crate) work: Option<Workspace>,
 }
 impl LatticeEstimator {
     /// Plans for one camera and mesh.

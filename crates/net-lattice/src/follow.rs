@@ -24,6 +24,7 @@ impl Workspace {
         surface.offset = surface.offset.map(|o| o + half);
         let lock = Lock {
             surface,
+            start,
             evidence: last.evidence,
             gain: last.gain * self.view.levels[0].raw.data().len() as f64,
             polarity: last.polarity,

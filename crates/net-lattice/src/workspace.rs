@@ -16,6 +16,7 @@ use crate::numeric::magnitude_quantile;
 use crate::search::{Candidate, Scope, Search};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
+use crate::stages::Stages;
 use crate::surface::{self, Params, Surface};
 use crate::view::View;
 
@@ -37,6 +38,8 @@ pub(crate) struct Workspace {
     pub twine: f64,
     /// What the next picture starts from.
     pub last: Option<Followed>,
+    /// What the stages of the last picture gave, if it was a cold start.
+    pub stages: Option<Stages>,
 }
 
 /// Buffers that the stages share.
@@ -61,6 +64,8 @@ pub(crate) struct Tools {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lock {
     pub surface: Surface,
+    /// What the search gave to lock to.
+    pub start: Surface,
     pub evidence: Evidence,
     pub gain: f64,
     pub polarity: Polarity,
@@ -99,12 +104,14 @@ impl Workspace {
             candidates: Vec::new(),
             twine: config.twine_diameter_m,
             last: None,
+            stages: None,
             view,
         }
     }
 
     pub(crate) fn load(&mut self, image: GrayView<'_>) {
         self.view.load(image);
+        self.stages = None;
         self.tools.high = [(0.0, 0.0); 4];
     }
 

@@ -136,6 +136,32 @@ fn square() -> Mesh {
 }
 
 #[test]
+fn every_stage_is_better_than_the_one_before() {
+    let camera = camera();
+    let mesh = Mesh::square(0.05).expect("a mesh");
+    let scene = Scene::flat(25.0, 40.0, 12.0, 0.9, mesh);
+    let picture = scene.draw();
+    let view = GrayView::packed(&picture, WIDTH, HEIGHT).expect("sized above");
+    let mut estimator = LatticeEstimator::new(&camera, &mesh, &Config::default()).expect("defaults are valid");
+    assert!(estimator.stages().is_none(), "nothing was looked at");
+    let answer = estimator.estimate(view).expect("sizes agree").expect("a net in plain view");
+    let stages = *estimator.stages().expect("a cold start");
+    let normal = scene.rotation * Vector3::z();
+    let of = |pose: &net_geometry::Pose| {
+        let range = pose.plane().range().expect("in front");
+        [(range / scene.range - 1.0).abs(), pose.normal().angle(&normal)]
+    };
+    let (waves, lock, last) = (of(&stages.wave_vectors), of(&stages.lock_in), of(&answer.pose));
+    for k in 0..2 {
+        // Spectra resolve a hundredth of a cycle per tile, phases a hundred times that; noise may favour the lock-in by a little over the drawing.
+        assert!(lock[k] < waves[k] && last[k] < 1.5 * lock[k].max(2e-5), "{waves:?} {lock:?} {last:?}");
+    }
+    // A followed picture has no search.
+    estimator.update(view, &answer.pose).expect("sizes agree");
+    assert!(estimator.stages().is_none());
+}
+
+#[test]
 fn near_and_far_tilted_and_turned() {
     for (tilt, azimuth, roll, range) in [(3.0, 0.0, 0.0, 0.5), (25.0, 130.0, 20.0, 0.9), (40.0, 250.0, -35.0, 1.4)] {
         let e = expect_right(&Scene::flat(tilt, azimuth, roll, range, square()));

@@ -1,6 +1,8 @@
 //! `netpose reproduce`: the thesis's experiments on virtual nets, its figures and ours side by side.
 
+mod bound;
 mod junctions;
+mod precision;
 mod published;
 mod ranges;
 mod reading;
@@ -28,6 +30,9 @@ pub struct Args {
     /// Pictures to each cell of the tables of tilts, half of them with the lattice lying otherwise
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
     scenes: u32,
+    /// Pictures to the table of precision
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    pictures: u32,
 }
 
 /// Parts of chapter 5.
@@ -41,6 +46,8 @@ enum Experiment {
     Junctions,
     /// Tracking over 99 flows and round a loop: section 5.5.
     Tracking,
+    /// Errors stage by stage beside the Cramér-Rao bound; not of the thesis.
+    Precision,
 }
 
 /// A column of results: a way to the pose.
@@ -58,9 +65,9 @@ fn columns() -> Vec<Column> {
 
 /// Runs the command.
 pub fn main(args: &Args) -> Result<Outcome> {
-    use Experiment::{Junctions, Ranges, Tilts, Tracking};
+    use Experiment::{Junctions, Precision, Ranges, Tilts, Tracking};
     let columns = columns();
-    for experiment in [Ranges, Tilts, Junctions, Tracking] {
+    for experiment in [Ranges, Tilts, Junctions, Tracking, Precision] {
         if !(args.only.is_empty() || args.only.contains(&experiment)) {
             continue;
         }
@@ -77,6 +84,12 @@ pub fn main(args: &Args) -> Result<Outcome> {
             }
             Junctions => vec![junctions::run(&columns)?],
             Tracking => tracking::run(&columns)?,
+            Precision => {
+                let mut progress = Progress::new(Some(u64::from(args.pictures)));
+                let table = precision::run(args.pictures, &mut progress);
+                progress.finish();
+                vec![table?]
+            }
         };
         for table in tables {
             print!("{}", if args.markdown { table.to_markdown() } else { table.to_text() });
