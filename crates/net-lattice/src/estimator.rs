@@ -14,7 +14,7 @@ use crate::workspace::Workspace;
 pub struct LatticeEstimator {
     camera: Camera,
     mesh: Mesh,
-    config: Config,
+    pub(crate) config: Config,
     /// `None` when the picture is too small for a lattice.
     pub(crate) work: Option<Workspace>,
 }

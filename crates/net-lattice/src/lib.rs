@@ -16,6 +16,7 @@
 //!
 //! `estimator` is the door; `cold` and `follow` put the stages together for a first and for a next picture, `conclude` ends both; `workspace`
 //! is what they share.
+//! 10. `layers`, `paint`: the net found painted over, and all of the above once more for one behind it.
 //!
 //! # Conventions
 //! Frames, pixels and units are those of [`net_geometry`]. Lattice coordinates are in cells. Of a bent net the pose is that of the tangent
@@ -52,6 +53,7 @@ mod estimator;
 mod fit;
 mod fold;
 mod follow;
+mod layers;
 mod likelihood;
 mod lockin;
 mod map;
@@ -59,6 +61,7 @@ mod model;
 mod naming;
 mod nodes;
 mod numeric;
+mod paint;
 mod search;
 mod smooth;
 mod spectra;

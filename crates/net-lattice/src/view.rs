@@ -180,6 +180,11 @@ impl View {
                 }
             }
         }
+        self.average_down();
+    }
+
+    /// Fills the levels above the lowest from it.
+    pub(crate) fn average_down(&mut self) {
         for l in 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(l);
             let (src, dst) = (&below[l - 1].raw, &mut above[0].raw);

@@ -4,9 +4,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use nalgebra::{Rotation3, Vector3};
+use net_geometry::Pose;
+
 use super::FOCAL_PX;
 use crate::scenario::CameraModel;
-use crate::scene::{Extent, Kind, Light, Net, NetPose, Object, Scene, Sensor, Snow, Surface, Water, Wave};
+use crate::scene::{Extent, Kind, Layer, Light, Net, NetPose, Object, Scene, Sensor, Snow, Surface, Water, Wave};
 
 /// Random numbers in the order they are asked for.
 pub(super) struct Draw(ChaCha8Rng);
@@ -207,6 +210,58 @@ impl Draw {
                 seed: self.index(1 << 40),
                 ..Object::default()
             });
+        }
+    }
+
+    /// Poses of a net and of one behind it, apart everywhere in view.
+    pub(super) fn behind(&mut self, side_m: f64) -> (NetPose, NetPose) {
+        loop {
+            let front = self.pose(0.4, 1.5, 40.0, side_m);
+            let mut back = self.pose(0.4, 1.5, 55.0, side_m);
+            back.range_m = front.range_m * self.between(1.3, 2.5);
+            let (near, far) = (front.pose().plane(), back.pose().plane());
+            let turned = near.normal.angle(&far.normal).to_degrees();
+            let apart = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].into_iter().all(|(x, y)| {
+                let corner = Vector3::new(x * 424.0 / FOCAL_PX, y * 240.0 / FOCAL_PX, 1.0);
+                let depths = near.depth_along(corner).zip(far.depth_along(corner));
+                depths.is_some_and(|(near, far)| far > 1.15 * near)
+            });
+            if turned <= 25.0 && apart && FOCAL_PX * side_m * far.normal.z / back.range_m >= 4.0 {
+                return (front, back);
+            }
+        }
+    }
+
+    /// A sheet on the optical axis, and one sewn to it along its second mesh direction.
+    pub(super) fn sewn(&mut self, net: &Net) -> Vec<Layer> {
+        /// Cells from the seam to the far end of a sheet: out of view.
+        const FAR: i32 = 300;
+        loop {
+            let pose = self.pose(0.5, 2.5, 40.0, net.side1_m);
+            let side = self.sign();
+            let aside_m = pose.x_m + side * pose.range_m * self.between(0.05, 0.3);
+            let column = (aside_m / net.side1_m).round() as i32;
+            let turn =
+                Rotation3::from_axis_angle(&Vector3::y_axis(), (self.sign() * self.between(10.0, 50.0)).to_radians());
+            let shift_m = self.between(-0.5, 0.5) * net.side2_m;
+            let first = pose.pose();
+            let origin = first.transform(Vector3::new(f64::from(column) * net.side1_m, shift_m, 0.0));
+            let second = Pose { rotation: first.rotation * turn, translation: origin };
+            let Some(second) =
+                NetPose::from_pose(&second).filter(|p| p.pose().normal().z > 0.35 && p.validate().is_ok())
+            else {
+                continue;
+            };
+            let sheet = |pose: NetPose, column: i32, side: f64, number: u64| {
+                let i = if side > 0.0 { [column - FAR, column] } else { [column, column + FAR] };
+                let net = Net {
+                    extent: Extent::Cells { i, j: [-FAR, FAR] },
+                    seed: net.seed.wrapping_add(number),
+                    ..net.clone()
+                };
+                Layer { net, pose }
+            };
+            return vec![sheet(pose, column, side, 0), sheet(second, 0, -side, 1)];
         }
     }
 

@@ -38,12 +38,28 @@ pub enum Study {
     Jitter5,
     /// As [`Study::Noise`], the sheet bent by up to 0.15 per metre in every direction, sides as long as ever.
     Sag,
+    /// Two nets one behind the other: as [`Study::Noise`], the front one from 0.4 to 1.5 m and to 40 degrees, the other 1.3 to 2.5 times as
+    /// far and turned by up to 25 degrees against it; nowhere in view do they meet.
+    Layers,
+    /// Two sheets sewn together: as [`Study::Noise`] from 0.5 to 2.5 m and to 40 degrees, and beside a seam that runs through the picture, 5
+    /// to 30 % of the range aside of the optical axis, a second sheet turned about it by 10 to 50 degrees, its rows beginning anywhere. The
+    /// first layer is the sheet that the axis meets.
+    Seam,
 }
 
 impl Study {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Planar, Self::Hung, Self::Negative, Self::Noise, Self::Jitter2, Self::Jitter5, Self::Sag];
+    pub const ALL: [Self; 9] = [
+        Self::Planar,
+        Self::Hung,
+        Self::Negative,
+        Self::Noise,
+        Self::Jitter2,
+        Self::Jitter5,
+        Self::Sag,
+        Self::Layers,
+        Self::Seam,
+    ];
 
     /// The word for it.
     pub fn name(self) -> &'static str {
@@ -55,6 +71,8 @@ impl Study {
             Self::Jitter2 => "jitter2",
             Self::Jitter5 => "jitter5",
             Self::Sag => "sag",
+            Self::Layers => "layers",
+            Self::Seam => "seam",
         }
     }
 
@@ -72,6 +90,8 @@ impl Study {
                 net.surface.curvature_per_m =
                     [draw.between(-bend, bend), draw.between(-bend, bend), draw.between(-bend, bend)];
             }),
+            Self::Layers => layers(seed),
+            Self::Seam => seam(seed),
         };
         Scenario { name: format!("study-{}-{seed}", self.name()), seed, ..drawn }
     }
@@ -208,6 +228,29 @@ fn steady(seed: u64, change: fn(&mut Draw, &mut Net)) -> Scenario {
     draw.contrast(&mut scene, 1.0);
     scene.layers.iter_mut().for_each(|layer| change(&mut draw, &mut layer.net));
     scenario("A flat net for covariances, drawn at random", "50mm", scene)
+}
+
+fn layers(seed: u64) -> Scenario {
+    let mut draw = Draw::new(seed, 5);
+    let (front, back) = draw.behind(0.05);
+    let net = |draw: &mut Draw, number| Net {
+        seed: seed.wrapping_add(number),
+        twine: Twine { diameter_m: draw.between(0.0015, 0.003), ..Twine::default() },
+        ..Net::default()
+    };
+    let layers = vec![Layer { net: net(&mut draw, 0), pose: front }, Layer { net: net(&mut draw, 1), pose: back }];
+    let mut scene = Scene { layers, seed, ..Scene::empty() };
+    draw.contrast(&mut scene, 1.0);
+    scenario("A net behind a net, drawn at random", "50mm", scene)
+}
+
+fn seam(seed: u64) -> Scenario {
+    let mut draw = Draw::new(seed, 6);
+    let twine = Twine { diameter_m: draw.between(0.0015, 0.003), ..Twine::default() };
+    let layers = draw.sewn(&Net { seed, twine, ..Net::default() });
+    let mut scene = Scene { layers, seed, ..Scene::empty() };
+    draw.contrast(&mut scene, 1.0);
+    scenario("Two sheets that meet at a seam, drawn at random", "50mm", scene)
 }
 
 fn scenario(description: &str, mesh: &str, scene: Scene) -> Scenario {
