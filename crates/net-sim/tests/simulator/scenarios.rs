@@ -1,7 +1,7 @@
 //! Named scenarios, sequences, studies, the thesis's algorithm, and that all is the same every time.
 
 use crate::support::{Result, camera, hash};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use net_sim::{Extent, Image, NetPose, Path, Scenario, Scene, Simulator, Study, thesis};
 
 #[test]
@@ -282,6 +282,42 @@ fn studies_cover_what_they_promise() -> Result {
         ("meshes", meshes),
     ] {
         assert!((15..200).contains(&count), "{what}: {count} of 300");
+    }
+    Ok(())
+}
+
+#[test]
+fn nets_of_the_layers_stay_apart_and_sheets_meet_at_their_seam() -> Result {
+    for seed in 0..40 {
+        let scenario = Study::Layers.scenario(seed);
+        scenario.validate()?;
+        let [front, back] = [0, 1].map(|k| scenario.scene.layers[k].pose.pose().plane());
+        let camera = scenario.camera()?;
+        for (u, v) in [(0.0, 0.0), (847.0, 0.0), (0.0, 479.0), (847.0, 479.0), (424.0, 240.0)] {
+            let ray = camera.ray_from_pixel(Vector2::new(u, v)).ok_or("no ray")?;
+            let depths = front.depth_along(ray).zip(back.depth_along(ray)).ok_or("the view leaves a net")?;
+            assert!(depths.1 > 1.1 * depths.0, "seed {seed}: {depths:?}");
+        }
+
+        let scenario = Study::Seam.scenario(seed);
+        scenario.validate()?;
+        let mut image = Image::default();
+        let truth = Simulator::new(camera).render(&scenario.scene, 1, &mut image)?.clone();
+        // The axis meets the first sheet where that has knots around it, and at the seam both have the same line.
+        let [first, second] = [&truth.layers[0], &truth.layers[1]];
+        let on_axis = first.axis.ok_or("the axis misses the sheet")?.cells.x;
+        let Extent::Cells { i, .. } = scenario.scene.layers[0].net.extent else { return Err("endless".into()) };
+        assert!(f64::from(i[0]) < on_axis && on_axis < f64::from(i[1]), "seed {seed}");
+        let seam = if i[1] - on_axis as i32 > 150 { i[0] } else { i[1] };
+        let line = |net: &net_sim::LayerTruth, column: i32, y: f64| {
+            net.pose.transform(net.mesh.a1().push(0.0) * f64::from(column) + Vector3::y() * y)
+        };
+        let along = (line(first, seam, 1.0) - line(first, seam, 0.0)).normalize();
+        for y in [-0.4, 0.0, 0.7] {
+            let off = line(second, 0, y) - line(first, seam, 0.0);
+            // on the line, to rounding
+            assert!((off - along * along.dot(&off)).norm() < 1e-9, "seed {seed}");
+        }
     }
     Ok(())
 }
