@@ -31,6 +31,9 @@ impl std::str::FromStr for Method {
 pub struct Config {
     /// How the pose is found.
     pub method: Method,
+    /// Look for a second net, before or behind the first, in every picture that shows one ([`crate::Estimate::layers`]). Default false: it
+    /// takes as long as a cold start, in every frame. Of [`Method::Lattice`] alone.
+    pub layers: bool,
     /// Of [`Method::Lattice`].
     pub lattice: net_lattice::Config,
     /// Of [`Method::Thesis`].

@@ -55,6 +55,17 @@ pub struct Sheet {
     pub curvatures_per_m: [f64; 2],
 }
 
+/// One of several nets in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layer {
+    /// Where it is. The origin of a net that is not followed is the node nearest to the optical axis, in each frame anew.
+    pub net: NetPose,
+    /// In [0, 1]: that there is this net and the pose is right. Never below the threshold for [`Status::Ok`].
+    pub probability: f64,
+    /// Whether it is the one that [`Estimate::net`] tells of and the track follows.
+    pub followed: bool,
+}
+
 /// What one frame says. Borrows the tracker's buffers: copy what must outlive the next frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Estimate<'a> {
@@ -71,4 +82,6 @@ pub struct Estimate<'a> {
     pub junctions: &'a [Junction],
     /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].
     pub twines: &'a [Twine],
+    /// All nets that can be vouched for, nearest first, with [`crate::Config::layers`] set; the followed one is among them.
+    pub layers: &'a [Layer],
 }

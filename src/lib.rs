@@ -12,7 +12,7 @@ mod tracker;
 
 pub use config::{Config, Method};
 pub use error::{Error, Result};
-pub use estimate::{Estimate, NetPose, Sheet, Status};
+pub use estimate::{Estimate, Layer, NetPose, Sheet, Status};
 pub use net_geometry::{Camera, Junction, JunctionState, Lens, Mesh, Plane, Pose};
 pub use net_image::GrayView;
 pub use net_junction::{Twine, TwineState};

@@ -4,7 +4,7 @@ use net_image::GrayView;
 
 use crate::config::{Config, Method};
 use crate::error::{Error, Result};
-use crate::estimate::{Estimate, Status};
+use crate::estimate::{Estimate, Layer, Status};
 use crate::method::lattice::LatticeMethod;
 use crate::method::thesis::{PROBABILITY_THRESHOLD, ThesisMethod};
 
@@ -16,6 +16,9 @@ pub struct Tracker {
     threshold: f64,
     previous_ns: Option<i64>,
     junctions: Vec<Junction>,
+    /// Whether to look for more than one net, and what was found.
+    several: bool,
+    layers: Vec<Layer>,
 }
 
 #[derive(Debug)]
@@ -41,7 +44,15 @@ impl Tracker {
                 (Engine::Thesis(Box::new(method)), PROBABILITY_THRESHOLD)
             }
         };
-        Ok(Self { camera, method, threshold, previous_ns: None, junctions: Vec::new() })
+        Ok(Self {
+            camera,
+            method,
+            threshold,
+            previous_ns: None,
+            junctions: Vec::new(),
+            several: config.layers,
+            layers: Vec::new(),
+        })
     }
 
     /// The next frame, taken at `timestamp_ns` (ns since the Unix epoch).
@@ -65,11 +76,21 @@ impl Tracker {
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
         let status = if net.is_some() { Status::Ok } else { Status::NoNet };
+        self.layers.clear();
+        if let (Some(net), true) = (net, self.several) {
+            self.layers.push(Layer { net, probability, followed: true });
+            let other = match &mut self.method {
+                Engine::Lattice(method) => method.another(image)?.filter(|layer| layer.probability >= self.threshold),
+                Engine::Thesis(_) => None,
+            };
+            self.layers.extend(other);
+            self.layers.sort_by(|a, b| a.net.range_m.total_cmp(&b.net.range_m));
+        }
         let twines = match &self.method {
             Engine::Lattice(method) if net.is_some() => method.twines(),
             _ => &[],
         };
-        Ok(Estimate { status, probability, net, track, junctions: &self.junctions, twines })
+        Ok(Estimate { status, probability, net, track, junctions: &self.junctions, twines, layers: &self.layers })
     }
 
     /// Where a point of the lattice (fractions included) is in the last frame that had a pose: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as

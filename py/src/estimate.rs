@@ -16,6 +16,50 @@ pub struct Estimate {
     track: u32,
     net: Option<netpose::NetPose>,
     junctions: Vec<netpose::Junction>,
+    layers: Vec<netpose::Layer>,
+}
+
+/// One of several nets in a picture.
+#[pyclass(frozen, module = "netpose_rs")]
+pub struct Layer {
+    inner: netpose::Layer,
+}
+
+#[pymethods]
+impl Layer {
+    #[getter]
+    fn probability(&self) -> f64 {
+        self.inner.probability
+    }
+    #[getter]
+    fn followed(&self) -> bool {
+        self.inner.followed
+    }
+    #[getter]
+    fn range_m(&self) -> f64 {
+        self.inner.net.range_m
+    }
+    #[getter]
+    fn distance_m(&self) -> f64 {
+        self.inner.net.distance_m
+    }
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.inner.net.normal.as_slice().to_pyarray(py)
+    }
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        matrix(py, 4, |r, c| self.inner.net.pose.matrix()[(r, c)])
+    }
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        matrix(py, 6, |r, c| self.inner.net.covariance[(r, c)])
+    }
+    fn __repr__(&self) -> String {
+        let Layer { inner } = self;
+        let followed = if inner.followed { "True" } else { "False" };
+        format!("Layer(range_m={:.4}, probability={:.3}, followed={followed})", inner.net.range_m, inner.probability)
+    }
 }
 
 impl Estimate {
@@ -27,6 +71,7 @@ impl Estimate {
             track: estimate.track,
             net: estimate.net,
             junctions: estimate.junctions.to_vec(),
+            layers: estimate.layers.to_vec(),
         }
     }
 }
@@ -62,6 +107,10 @@ impl Estimate {
     fn lattice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
         let rows: Vec<i64> = self.junctions.iter().flat_map(index_or_unnamed).collect();
         array2(py, rows, self.junctions.len(), 2)
+    }
+    #[getter]
+    fn layers(&self) -> Vec<Layer> {
+        self.layers.iter().map(|&inner| Layer { inner }).collect()
     }
     #[getter]
     fn sigma_range_m(&self) -> Option<f64> {

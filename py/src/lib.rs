@@ -12,7 +12,7 @@ mod _core {
     #[pymodule_export]
     use crate::camera::{Camera, Mesh};
     #[pymodule_export]
-    use crate::estimate::Estimate;
+    use crate::estimate::{Estimate, Layer};
     #[pymodule_export]
     use crate::stages::fft::{SectionPoses, lattice_vectors, peaks, scores, sections, spectrum};
     #[pymodule_export]

@@ -15,9 +15,10 @@ pub struct Tracker {
 #[pymethods]
 impl Tracker {
     #[new]
-    #[pyo3(signature = (camera, mesh, *, method=None))]
-    fn new(camera: &Camera, mesh: &Mesh, method: Option<&str>) -> PyResult<Self> {
-        Ok(Self { inner: netpose::Tracker::new(camera.inner, mesh.inner, &config(method)?).map_err(value_error)? })
+    #[pyo3(signature = (camera, mesh, *, method=None, layers=false))]
+    fn new(camera: &Camera, mesh: &Mesh, method: Option<&str>, layers: bool) -> PyResult<Self> {
+        let config = netpose::Config { layers, ..config(method)? };
+        Ok(Self { inner: netpose::Tracker::new(camera.inner, mesh.inner, &config).map_err(value_error)? })
     }
 
     fn update(&mut self, py: Python<'_>, image: &Bound<'_, PyAny>, timestamp_ns: i64) -> PyResult<Estimate> {
@@ -36,15 +37,16 @@ impl Tracker {
 
 /// One image, no state.
 #[pyfunction]
-#[pyo3(signature = (image, camera, mesh, *, method=None))]
+#[pyo3(signature = (image, camera, mesh, *, method=None, layers=false))]
 pub fn estimate(
     py: Python<'_>,
     image: &Bound<'_, PyAny>,
     camera: &Camera,
     mesh: &Mesh,
     method: Option<&str>,
+    layers: bool,
 ) -> PyResult<Estimate> {
-    Tracker::new(camera, mesh, method)?.update(py, image, 0)
+    Tracker::new(camera, mesh, method, layers)?.update(py, image, 0)
 }
 
 fn config(method: Option<&str>) -> PyResult<netpose::Config> {

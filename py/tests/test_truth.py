@@ -118,3 +118,20 @@ def test_the_same_picture_gives_the_same_answer(plain: npr.sim.SimFrame, result:
     assert np.array_equal(again.junctions, result.junctions)
     colour = npr.estimate(np.repeat(plain.image[..., None], 3, axis=2), plain.camera, plain.mesh)
     assert colour.pose is not None and np.array_equal(colour.pose, result.pose)
+
+
+def test_a_net_behind_a_net_is_a_layer_of_its_own(plain: npr.sim.SimFrame) -> None:
+    double = npr.sim.render("study-layers-2")
+    result = npr.estimate(double.image, double.camera, double.mesh, layers=True)
+    front, back = result.layers
+    assert front.range_m < back.range_m and double.range_m is not None
+    # The nearest net is the simulator's first; each is noise to the other.
+    assert front.range_m == pytest.approx(double.range_m, rel=5 * RANGE_REL)
+    assert [layer.followed for layer in result.layers].count(True) == 1
+    followed = front if front.followed else back
+    assert followed.range_m == result.range_m and followed.probability == result.probability
+    assert back.pose.shape == (4, 4) and back.covariance.shape == (6, 6) and back.normal.shape == (3,)
+    assert "followed=" in repr(back)
+    # One net is one layer; without the flag none are listed.
+    assert len(npr.estimate(plain.image, plain.camera, plain.mesh, layers=True).layers) == 1
+    assert npr.estimate(plain.image, plain.camera, plain.mesh).layers == []

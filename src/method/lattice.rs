@@ -9,7 +9,7 @@ use net_junction::{AdjustConfig, LatticeMap, NetAdjuster, Twine};
 use net_lattice::{LatticeEstimate, LatticeEstimator};
 
 use crate::error::Result;
-use crate::estimate::{NetPose, Sheet};
+use crate::estimate::{Layer, NetPose, Sheet};
 use crate::method::{Found, Track};
 use crate::motion::Motion;
 
@@ -165,6 +165,13 @@ impl LatticeMethod {
             }
         }
         estimate
+    }
+
+    /// The net before or behind the one of the last frame that had a pose, in that frame's picture.
+    pub fn another(&mut self, image: GrayView<'_>) -> Result<Option<Layer>> {
+        let Some((_, first)) = &self.last else { return Ok(None) };
+        let other = self.estimator.another(image, first)?;
+        Ok(other.map(|e| Layer { net: net_pose(&e), probability: e.probability, followed: false }))
     }
 
     /// The twines of the last frame that had a pose.

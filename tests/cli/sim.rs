@@ -147,3 +147,43 @@ fn a_scenario_from_a_file_is_drawn_and_a_wrong_one_refused() {
     assert_status(&output, 2);
     assert_says(&output, &["no-such-net", "--list"]);
 }
+
+#[test]
+fn a_net_behind_a_net_gets_a_row_of_its_own() {
+    let scratch = Scratch::new();
+    let drawn = netpose()
+        .arg("sim")
+        .arg(scratch.path("log"))
+        .args(["--scenario", "study-layers-2", "--frames", "1"])
+        .output()
+        .unwrap();
+    assert_status(&drawn, 0);
+    run(&scratch, "log", "out", &["--layers"]);
+    let rows = |path: &str| -> Vec<std::collections::HashMap<String, String>> {
+        csv::Reader::from_path(scratch.path(path)).unwrap().deserialize().map(Result::unwrap).collect()
+    };
+    let (poses, layers, truth) = (rows("out/poses.csv"), rows("out/layers.csv"), rows("log/truth_layers.csv"));
+    assert_eq!(layers.iter().map(|row| row["layer"].as_str()).collect::<Vec<_>>(), ["0", "1"]);
+    let number = |row: &std::collections::HashMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
+    for (row, net) in layers.iter().zip(&truth) {
+        // A tenth of what a claim is allowed.
+        assert!((number(row, "range_m") / number(net, "range_m") - 1.0).abs() < 0.005, "{row:?}");
+        assert!(number(row, "probability") >= 0.5);
+    }
+    // One of them is the net of poses.csv.
+    let followed: Vec<_> = layers.iter().filter(|row| row["followed"] == "1").collect();
+    assert_eq!(followed.len(), 1);
+    assert_eq!(followed[0]["range_m"], poses[0]["range_m"]);
+    // A run without the flag leaves no rows of an earlier one behind.
+    run(&scratch, "log", "out", &["--force"]);
+    assert!(!scratch.path("out/layers.csv").exists());
+    // Nothing to resume from.
+    let output = netpose()
+        .arg("run")
+        .arg(scratch.path("log"))
+        .args(["--cell", "50mm", "--layers", "--resume", "--out"])
+        .arg(scratch.path("out"))
+        .output()
+        .unwrap();
+    assert_status(&output, 2);
+}

@@ -8,6 +8,7 @@ __all__ = [
     "Camera",
     "Mesh",
     "Estimate",
+    "Layer",
     "SectionPoses",
     "lattice_vectors",
     "peaks",
@@ -127,6 +128,9 @@ class Estimate:
     def track(self) -> int:
         """Number of the count of cells: grows by one each time the net was lost and the origin is another node."""
     @property
+    def layers(self) -> list[Layer]:
+        """All nets that can be vouched for, nearest first, with ``layers=True``; empty without, and with no pose."""
+    @property
     def sigma_range_m(self) -> float | None:
         """One standard deviation of the range, m."""
     @property
@@ -143,16 +147,49 @@ class Estimate:
         """Principal curvatures at the optical axis, 1/m; positive bends away. None from ``method="thesis"``."""
 
 @final
+class Layer:
+    """One of several nets in a picture. The origin of one that is not followed is the node nearest to the optical axis, in each
+    picture anew."""
+
+    @property
+    def probability(self) -> float:
+        """In [0, 1]: that there is this net and the pose is right; never below the threshold for ``"ok"``."""
+    @property
+    def followed(self) -> bool:
+        """Whether it is the net that the estimate itself tells of."""
+    @property
+    def range_m(self) -> float:
+        """From the camera centre to the net along the optical axis, m."""
+    @property
+    def distance_m(self) -> float:
+        """Perpendicular distance, m."""
+    @property
+    def normal(self) -> npt.NDArray[np.float64]:
+        """(3,) unit normal of the net in the camera frame, positive z."""
+    @property
+    def pose(self) -> npt.NDArray[np.float64]:
+        """(4, 4) net to camera."""
+    @property
+    def covariance(self) -> npt.NDArray[np.float64]:
+        """(6, 6), rotation (rad) then translation (m), perturbation in the camera frame."""
+
+@final
 class Tracker:
     """Follows one net through the frames of one camera."""
 
-    def __new__(cls, camera: Camera, mesh: Mesh, *, method: _Method | None = None) -> Tracker: ...
+    def __new__(
+        cls, camera: Camera, mesh: Mesh, *, method: _Method | None = None, layers: bool = False
+    ) -> Tracker:
+        """With ``layers`` every picture that shows a net is searched for a second one, before or behind it; it takes as
+        long again as looking for the first from scratch."""
     def update(self, image: _Image, timestamp_ns: int) -> Estimate:
         """The next frame. Raises ValueError for an image of another size than the camera's, or a time that does not come
         after the frame before; TypeError for another dtype or shape."""
 
-def estimate(image: _Image, camera: Camera, mesh: Mesh, *, method: _Method | None = None) -> Estimate:
-    """One image, no state."""
+def estimate(
+    image: _Image, camera: Camera, mesh: Mesh, *, method: _Method | None = None, layers: bool = False
+) -> Estimate:
+    """One image, no state. ``layers`` as of ``Tracker``."""
 
 # Stages: documented in the modules fft, junction, flow and sim.
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use netpose::{Camera, Config, Estimate, Mesh, Tracker};
+use netpose::{Camera, Config, Estimate, Mesh, NetPose, Tracker};
 use serde_json::{Value, json};
 
 use crate::draw::{Overlay, Shown};
@@ -136,27 +136,40 @@ fn json_line(path: &Path, estimate: &Estimate<'_>, latency_ms: f64) -> String {
         "junctions": junctions, "latency_ms": latency_ms,
     });
     if let Some(net) = &estimate.net {
-        let rows = |m: &dyn Fn(usize, usize) -> f64, n: usize| -> Vec<Vec<f64>> {
-            (0..n).map(|r| (0..n).map(|c| m(r, c)).collect()).collect()
-        };
-        let (pose, covariance) = (net.pose.matrix(), net.covariance);
-        line["range_m"] = json!(net.range_m);
-        line["distance_m"] = json!(net.distance_m);
-        line["normal"] = json!(net.normal.as_slice());
-        // Net to camera, row by row.
-        line["pose"] = json!(rows(&|r, c| pose[(r, c)], 4));
-        // Rotation (rad) then translation (m), perturbation in the camera frame.
-        line["covariance"] = json!(rows(&|r, c| covariance[(r, c)], 6));
-        line["sigma_range_m"] = json!(net.sigma_range_m);
-        line["sigma_tilt_deg"] = json!(net.sigma_tilt.to_degrees());
-        line["sigma_xy_m"] = json!(net.sigma_xy_m);
+        describe(net, &mut line);
     }
-    if let Some(sheet) = estimate.net.and_then(|net| net.sheet) {
+    if !estimate.layers.is_empty() {
+        let layers = estimate.layers.iter().map(|layer| {
+            let mut value = json!({ "probability": layer.probability, "followed": layer.followed });
+            describe(&layer.net, &mut value);
+            value
+        });
+        line["layers"] = layers.collect();
+    }
+    line.to_string()
+}
+
+/// Adds a pose and what goes with it.
+fn describe(net: &NetPose, line: &mut Value) {
+    let rows = |m: &dyn Fn(usize, usize) -> f64, n: usize| -> Vec<Vec<f64>> {
+        (0..n).map(|r| (0..n).map(|c| m(r, c)).collect()).collect()
+    };
+    let (pose, covariance) = (net.pose.matrix(), net.covariance);
+    line["range_m"] = json!(net.range_m);
+    line["distance_m"] = json!(net.distance_m);
+    line["normal"] = json!(net.normal.as_slice());
+    // Net to camera, row by row.
+    line["pose"] = json!(rows(&|r, c| pose[(r, c)], 4));
+    // Rotation (rad) then translation (m), perturbation in the camera frame.
+    line["covariance"] = json!(rows(&|r, c| covariance[(r, c)], 6));
+    line["sigma_range_m"] = json!(net.sigma_range_m);
+    line["sigma_tilt_deg"] = json!(net.sigma_tilt.to_degrees());
+    line["sigma_xy_m"] = json!(net.sigma_xy_m);
+    if let Some(sheet) = &net.sheet {
         line["crossing_angle_deg"] = json!(sheet.crossing_angle.to_degrees());
         line["sigma_crossing_angle_deg"] = json!(sheet.sigma_crossing_angle.to_degrees());
         line["curvatures_per_m"] = json!(sheet.curvatures_per_m);
     }
-    line.to_string()
 }
 
 fn unreadable_json(path: &Path, why: &anyhow::Error) -> String {

@@ -9,7 +9,7 @@ use net_log::{
     DEFAULT_CAMERA_FRAME, NetColumns, PoseRow, RawFrame, RowStatus, RunFiles, RunPaths, RunSummary, TimingHistogram,
     write_report,
 };
-use netpose::{Camera, Status};
+use netpose::{Camera, NetPose, Status};
 
 use super::examples::Examples;
 use super::frames::Tracked;
@@ -17,7 +17,7 @@ use crate::draw::Overlay;
 use crate::failure::Outcome;
 
 /// Columns of `poses.csv` behind the usual ones: the count of cells, and how the net hangs where the method estimates it.
-const APPENDED: [&str; 5] =
+pub const APPENDED: [&str; 5] =
     ["track", "crossing_angle_deg", "sigma_crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m"];
 
 /// What to do with what is in the folder already.
@@ -196,15 +196,7 @@ fn check_same(earlier: &RunSummary, now: &RunSummary) -> Result<()> {
 }
 
 fn row(frame: &RawFrame, tracked: &Tracked, first_track: u32) -> PoseRow {
-    let net = tracked.net.map(|net| NetColumns {
-        range_m: net.range_m,
-        distance_m: net.distance_m,
-        normal: net.normal,
-        pose: net.pose,
-        sigma_range_m: net.sigma_range_m,
-        sigma_tilt_deg: net.sigma_tilt.to_degrees(),
-        sigma_xy_m: net.sigma_xy_m,
-    });
+    let net = tracked.net.as_ref().map(columns);
     PoseRow {
         frame: frame.index,
         file: frame.name.to_string(),
@@ -221,19 +213,37 @@ fn row(frame: &RawFrame, tracked: &Tracked, first_track: u32) -> PoseRow {
     }
 }
 
+/// A pose in the columns of `poses.csv`.
+pub fn columns(net: &NetPose) -> NetColumns {
+    NetColumns {
+        range_m: net.range_m,
+        distance_m: net.distance_m,
+        normal: net.normal,
+        pose: net.pose,
+        sigma_range_m: net.sigma_range_m,
+        sigma_tilt_deg: net.sigma_tilt.to_degrees(),
+        sigma_xy_m: net.sigma_xy_m,
+    }
+}
+
 fn appended(tracked: &Tracked, first_track: u32) -> Vec<f64> {
     // NaN is an empty cell.
     let mut cells = vec![f64::NAN; APPENDED.len()];
     let Some(net) = &tracked.net else { return cells };
     cells[0] = f64::from(first_track.saturating_add(tracked.track));
-    if let Some(sheet) = &net.sheet {
-        cells[1] = sheet.crossing_angle.to_degrees();
-        cells[2] = sheet.sigma_crossing_angle.to_degrees();
-        cells[3..].copy_from_slice(&sheet.curvatures_per_m);
-    }
+    cells[1..].copy_from_slice(&hanging(net));
     cells
 }
 
-fn milliseconds(time: Duration) -> f64 {
+/// How a net hangs, in the last four of [`APPENDED`].
+pub fn hanging(net: &NetPose) -> [f64; 4] {
+    net.sheet.map_or([f64::NAN; 4], |sheet| {
+        let [larger, smaller] = sheet.curvatures_per_m;
+        [sheet.crossing_angle.to_degrees(), sheet.sigma_crossing_angle.to_degrees(), larger, smaller]
+    })
+}
+
+/// For tables.
+pub fn milliseconds(time: Duration) -> f64 {
     1e3 * time.as_secs_f64()
 }

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use net_image::Image;
 use net_log::{Log, RawFrame};
-use netpose::{Camera, Config, Error, Mesh, NetPose, Status, Tracker};
+use netpose::{Camera, Config, Error, Layer, Mesh, NetPose, Status, Tracker};
 
 use super::ahead::in_order;
 use super::count::{self, Count};
 use super::folder::{Ended, Finished, Folder};
+use super::layers::{self, LayersCsv};
 use super::nodes::Nodes;
 use super::overlays::Overlays;
 use crate::draw::{Overlay, Shown};
@@ -62,6 +63,8 @@ pub struct Tracked {
     pub net: Option<NetPose>,
     pub junctions: Vec<netpose::Junction>,
     pub twines: Vec<netpose::Twine>,
+    /// All nets, nearest first, where they were looked for.
+    pub layers: Vec<Layer>,
     /// Time of the tracker's update alone.
     pub latency: Duration,
 }
@@ -94,6 +97,10 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
         count::forget(&job.out)?;
     }
     let mut count = job.count.then(|| Count::new(&job.out)).transpose()?;
+    if !job.config.layers {
+        layers::forget(&job.out)?;
+    }
+    let mut layers = job.config.layers.then(|| LayersCsv::create(&job.out)).transpose()?;
     let mut map = job.map.then(|| NetMap::new(&job.out, job.mesh)).transpose()?;
     // No frame has shown yet that the calibration is this camera's.
     let mut size_confirmed = done.is_some();
@@ -118,6 +125,9 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
                         {
                             map.add(&counted, view, &tracker, &nodes, &tracked.twines)?;
                         }
+                    }
+                    if let Some(layers) = &mut layers {
+                        layers.write(&frame, tracked)?;
                     }
                     folder.consider(frame.index, &image, tracked);
                     if let Some(overlays) = &mut overlays {
@@ -163,6 +173,7 @@ fn track(
             latency: start.elapsed(),
             junctions: estimate.junctions.to_vec(),
             twines: estimate.twines.to_vec(),
+            layers: estimate.layers.to_vec(),
         },
         Err(Error::Geometry(why @ net_geometry::Error::ImageSize { .. })) if *size_confirmed => {
             return Ok(Err(why.to_string()));

@@ -5,6 +5,7 @@ mod count;
 mod examples;
 mod folder;
 mod frames;
+mod layers;
 mod nodes;
 mod overlays;
 
@@ -57,6 +58,10 @@ pub struct Args {
     /// Unroll the net: mosaic, coverage, holes and growth into DIR/map, DIR/holes.csv and DIR/growth.parquet
     #[arg(long, conflicts_with = "resume")]
     map: bool,
+    /// Look for a second net, before or behind the first, in every frame that shows one: DIR/layers.csv has a row for each. Takes as long as a
+    /// frame looked at from scratch, for every frame. Also by `layers = true` in the file of --config
+    #[arg(long, conflicts_with = "resume")]
+    layers: bool,
     /// Smooth the poses in the end and look for slipped cells: poses_smooth.csv, slips.csv; as `netpose smooth` does
     #[arg(long, conflicts_with = "resume")]
     smooth: bool,
@@ -71,7 +76,11 @@ pub struct Args {
 /// Runs the command.
 pub fn main(args: &Args) -> Result<Outcome> {
     let mesh = args.setup.mesh()?;
-    let config = args.setup.config()?;
+    let mut config = args.setup.config()?;
+    config.layers |= args.layers;
+    if config.layers && args.resume {
+        bail!(Usage("--resume does not go with layers = true of --config: layers.csv is not resumed".into()));
+    }
     args.check()?;
     let log = net_log::open(&args.log, &args.open_options()).map_err(as_usage)?;
     let camera = args.setup.camera(log.info())?;
