@@ -128,7 +128,7 @@ impl Tally {
         if let Some(e) = found {
             let v = &e.evidence;
             line += &format!(
-                " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3}",
+                " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3}",
                 e.model,
                 e.polarity,
                 v.bend.to_degrees(),
@@ -137,6 +137,7 @@ impl Tally {
                 v.balance,
                 v.cell_snr,
                 v.dissent,
+                v.hidden,
                 v.v[0],
                 v.v[1],
                 v.v2[0],

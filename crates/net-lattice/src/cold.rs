@@ -1,5 +1,7 @@
 //! Cold start: candidates of the search locked to the picture, the best one's true cell, the model that the tiles support.
 
+use net_geometry::nalgebra::{Rotation3, Vector3};
+
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::LatticeEstimate;
@@ -28,6 +30,9 @@ const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 
+/// Tilt from which a lock-in is tried again, rad.
+const OTHER: f64 = 0.16;
+
 impl Workspace {
     pub(crate) fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
         self.search();
@@ -37,14 +42,15 @@ impl Workspace {
             if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
                 break;
             }
-            let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
-            let Some(surface) = self.lock(&start, &COLD, true) else { continue };
+            let mut start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
+            let centre = self.seed(&mut start);
+            let Some(surface) = self.lock(&start, &COLD, centre) else { continue };
             self.measure::<false>(&surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
-            let evidence = Evidence::new(&self.tools.measurements);
+            let evidence = self.evidence();
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
             let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
-            locks.push(Lock { surface, start, evidence, gain, polarity, blur });
+            locks.push(Lock { surface, start, centre, evidence, gain, polarity, blur });
             // Nearly every tile agrees: other candidates could only be other periods, which are tested below.
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
             if coherence > 0.8 && evidence.good > 0.9 {
@@ -52,6 +58,7 @@ impl Workspace {
             }
         }
         let lock = self.best_lock(locks)?;
+        let lock = self.elsewhere(lock);
         let (lock, margin) = self.true_cell(lock)?;
         self.stages = Some(Stages::new(&lock));
         self.finish(config, lock, margin)
@@ -62,7 +69,7 @@ impl Workspace {
         for (bank, search) in &mut self.banks {
             self.spectra.compute(&self.view, bank, &mut self.tools.smoother);
             found.clear();
-            search.run(bank, &self.scope, 6, &mut found);
+            search.run(bank, &self.scope, 3, &mut found);
             let scale = self.view.levels[bank.level].scale;
             found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
             let range = search.depths_m(self.scope.sides[0]);
@@ -85,6 +92,44 @@ impl Workspace {
         same.max_by(|a, b| coherence(a).total_cmp(&coherence(b))).copied()
     }
 
+    /// Locks again from other tilts about the one found, and keeps what agrees best. Bent sheets have more than one tilt from which the phases
+    /// settle, a cycle apart at the rim; all but one of them leave tiles behind.
+    fn elsewhere(&mut self, mut best: Lock) -> Lock {
+        let all = |e: &Evidence| f64::sqrt(2.0 * e.tiles.max(1) as f64);
+        if best.evidence.v[0].min(best.evidence.v[1]) > 0.9 * all(&best.evidence) {
+            return best;
+        }
+        let first = best;
+        let mut top = self.agreement(&first.surface).0;
+        for (x, y) in [(0.0, 0.0), (OTHER, 0.0), (-OTHER, 0.0), (0.0, OTHER), (0.0, -OTHER)] {
+            let turn = Rotation3::new(Vector3::new(x, y, 0.0)).into_inner();
+            let s = &first.surface;
+            let rotation = turn * s.rotation;
+            if rotation[(2, 2)] < 0.3 {
+                continue;
+            }
+            let mut start = Surface::flat(rotation, s.depth, s.angle, s.sides);
+            let centre = self.seed(&mut start);
+            let Some(surface) = self.lock(&start, &COLD, centre) else { continue };
+            if (surface.depth / first.surface.depth).ln().abs() > 0.06 {
+                continue;
+            }
+            let (score, evidence) = self.agreement(&surface);
+            if score > top {
+                top = score;
+                best = Lock { surface, centre, evidence, ..first };
+            }
+        }
+        best
+    }
+
+    /// How well the tiles agree with a locked sheet, in both harmonics; the second is never fitted.
+    fn agreement(&mut self, surface: &Surface) -> (f64, Evidence) {
+        self.measure::<true>(surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
+        let e = self.evidence();
+        (e.v[0].min(e.v[1]) + e.v2[0].abs().min(e.v2[1].abs()), e)
+    }
+
     /// Tests the rival periods; returns the best, and the share of its gain by which the second falls short.
     fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64)> {
         let cell = self.short_px(lock.surface.depth);
@@ -98,11 +143,14 @@ impl Workspace {
         let mut all: Vec<(f64, f64, Lock)> = Vec::new();
         let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
         for m in rivals {
+            let mut centre = lock.centre;
             let surface = if m == 1.0 {
                 lock.surface
             } else {
-                let Some(s) = self.lock(&lock.surface.scaled(m), &RIVAL, true) else { continue };
-                let v = Evidence::new(&self.tools.measurements).v;
+                let mut start = lock.surface.scaled(m);
+                centre = self.seed(&mut start);
+                let Some(s) = self.lock(&start, &RIVAL, centre) else { continue };
+                let v = self.evidence().v;
                 // Waves of that period are not there at all.
                 if v[0].min(v[1]) < 1.0 {
                     continue;
@@ -111,21 +159,20 @@ impl Workspace {
             };
             let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
             // A lattice of which only every second or third line is there draws most of the picture, too.
-            let scale = self.view.levels[level].scale;
-            let (short, t) = (self.short_px(surface.depth) / scale, &mut self.tools);
-            let fold = t.folder.fold(&self.view.levels[level], &t.map, t.high[level].1, short);
-            let all_there = 1.0 - (2.0 * fold.unlike).min(1.0);
+            let place = (level, self.view.tiling_for(self.cell_px(surface.depth)));
+            self.measure::<false>(&surface, place, 1.0, &Window::ALL);
+            let all_there = 1.0 - (2.0 * self.fold(&surface, place).unlike).min(1.0);
             all.push((
                 gain * if gain > 0.0 { all_there } else { 1.0 },
                 m,
-                Lock { surface, start: lock.start.scaled(m), gain, polarity, blur, ..lock },
+                Lock { surface, start: lock.start.scaled(m), centre, gain, polarity, blur, ..lock },
             ));
         }
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (gain, m, mut best) = *all.first()?;
         let second = all.get(1).map_or(0.0, |a| a.0);
         if m != 1.0
-            && let Some(s) = self.lock(&best.surface, &COLD[2..], false)
+            && let Some(s) = self.lock(&best.surface, &COLD[2..], best.centre)
         {
             best.surface = s;
         }
@@ -138,7 +185,7 @@ impl Workspace {
 
     /// One family can sit half a cell off when the other decided the polarity: the drawing tells.
     fn seat_families(&mut self, best: &mut Lock, level: usize, widest: f64) {
-        self.high(level, widest);
+        self.high(level, self.view.high_pass_px(widest));
         let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
         drawing.sparse = true;
         let mut top = (f64::NEG_INFINITY, best.surface);

@@ -5,7 +5,6 @@ use net_geometry::nalgebra::Vector3;
 
 use crate::config::Config;
 use crate::covariance;
-use crate::decision::Evidence;
 use crate::estimate::{Labels, LatticeEstimate};
 use crate::lockin::Window;
 use crate::model::{self, Model};
@@ -50,11 +49,9 @@ impl Workspace {
         let errors = covariance::pose(&surface, &labels, &c, count);
         let place = self.scale_for(surface.depth);
         self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
-        let evidence = Evidence::new(&self.tools.measurements).near(&self.tools.measurements, self.window(220.0));
+        let evidence = self.evidence();
         let mean_plane = self.mean_plane(&surface);
-        let cell = self.short_px(surface.depth) / self.view.levels[place.0].scale;
-        let t = &mut self.tools;
-        let evidence = evidence.folded(t.folder.fold(&self.view.levels[place.0], &t.map, t.high[place.0].1, cell));
+        let evidence = evidence.folded(self.fold(&surface, place));
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {

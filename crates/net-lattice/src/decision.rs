@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::fold::Fold;
 use crate::lockin::{Measurement, Window};
+use crate::numeric::median;
 
 /// Coherence of the phases left over in the tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -13,7 +14,7 @@ pub struct Evidence {
     pub v: [f64; 2],
     /// The same of the second harmonic, which is never fitted; the fundamental's where no tile resolves it.
     pub v2: [f64; 2],
-    /// Share of tiles with both residual phases below 1 rad.
+    /// Share of tiles with both residual phases below 1 rad, of those that are not hidden.
     pub good: f64,
     /// The same among the tiles about the optical axis that are not empty (at least four tenths of them), where range and normal are
     /// claimed; zero without such tiles.
@@ -31,6 +32,8 @@ pub struct Evidence {
     pub cell_snr: f64,
     /// Share of the tiles with strong waves whose phases contradict the lattice.
     pub dissent: f64,
+    /// Share of the tiles in which something else than a net hides what could agree or contradict.
+    pub hidden: f64,
     /// Tiles about the optical axis that counted, of those there are.
     pub near: [usize; 2],
     /// Tiles that counted.
@@ -39,24 +42,65 @@ pub struct Evidence {
     pub tiles2: usize,
 }
 
+/// What the tiles look like in which the lattice is.
+#[derive(Debug, Clone, Copy)]
+struct Usual {
+    amplitude: [f64; 2],
+    power: f64,
+}
+
+impl Usual {
+    /// Medians over the tiles that agree; `None` for a handful of them.
+    fn new(measurements: &[Measurement], scratch: &mut Vec<f64>) -> Option<Self> {
+        let mut of = |value: &dyn Fn(&Measurement) -> f64| {
+            scratch.clear();
+            scratch.extend(measurements.iter().filter(|m| m.aligned()).map(value));
+            (scratch.len() >= 6).then(|| median(scratch))
+        };
+        Some(Self { amplitude: [of(&|m| m.amplitude[0])?, of(&|m| m.amplitude[1])?], power: of(&|m| m.power)? })
+    }
+
+    /// A tile that does not agree, yet contradicts nothing: what is in it is far stronger than twine is elsewhere, or there are no waves
+    /// at all where they should be. Fish do both. Waves as strong as elsewhere and out of step do not count as hidden.
+    fn hides(&self, m: &Measurement) -> bool {
+        const LOUD: f64 = 8.0;
+        const FAINT: f64 = 0.3;
+        let faint = (0..2).all(|f| m.amplitude[f] < FAINT * self.amplitude[f]);
+        !m.aligned() && (m.power > LOUD * self.power || faint)
+    }
+}
+
 impl Evidence {
-    pub(crate) fn new(measurements: &[Measurement]) -> Self {
+    /// From the tiles; those within `near` of the optical axis are where range and normal are claimed.
+    pub(crate) fn new(measurements: &[Measurement], near: Window, scratch: &mut Vec<f64>) -> Self {
+        let usual = Usual::new(measurements, scratch);
         let mut e = Self::default();
         let mut sum = [0.0; 2];
         let mut sum2 = [0.0; 2];
-        let mut aligned = 0usize;
+        let (mut aligned, mut hidden) = (0usize, 0usize);
         let (mut strong, mut against) = (0usize, 0usize);
-        for m in measurements.iter().filter(|m| m.good) {
-            for f in 0..2 {
-                let loud = m.snr[f] > 12.0;
-                strong += usize::from(loud);
-                against += usize::from(loud && m.phase[f].abs() > 1.2);
+        let (mut aligned_near, mut silent_near) = (0usize, 0usize);
+        for m in measurements {
+            let hides = m.good && usual.is_some_and(|u| u.hides(m));
+            let (u, v) = (m.site.pixel[0] - near.centre[0], m.site.pixel[1] - near.centre[1]);
+            if u.hypot(v) <= near.radius {
+                e.near[1] += 1;
+                e.near[0] += usize::from(m.good);
+                silent_near += usize::from(m.empty || hides);
+                aligned_near += usize::from(m.aligned());
+            }
+            if !m.good {
+                continue;
             }
             e.tiles += 1;
-            aligned += usize::from(m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
+            hidden += usize::from(hides);
+            aligned += usize::from(m.aligned());
             let second = m.k[0].max(m.k[1]) < 1.0 / 6.0;
             e.tiles2 += usize::from(second);
             for f in 0..2 {
+                let loud = m.snr[f] > 12.0 && !hides;
+                strong += usize::from(loud);
+                against += usize::from(loud && m.phase[f].abs() > 1.2);
                 sum[f] += m.phase[f].cos();
                 if second {
                     sum2[f] += m.phase2[f].cos();
@@ -65,30 +109,15 @@ impl Evidence {
         }
         if e.tiles > 0 {
             e.v = sum.map(|s| s * f64::sqrt(2.0 / e.tiles as f64));
-            e.good = aligned as f64 / e.tiles as f64;
+            e.hidden = hidden as f64 / e.tiles as f64;
+            e.good = aligned as f64 / (e.tiles - hidden).max(1) as f64;
         }
         e.dissent = against as f64 / strong.max(1) as f64;
         e.v2 = if e.tiles2 > 8 { sum2.map(|s| s * f64::sqrt(2.0 / e.tiles2 as f64)) } else { e.v };
-        e
-    }
-
-    /// Adds what is known about the optical axis.
-    pub(crate) fn near(mut self, measurements: &[Measurement], window: Window) -> Self {
-        let (mut aligned, mut empty) = (0, 0);
-        for m in measurements {
-            let (u, v) = (m.site.pixel[0] - window.centre[0], m.site.pixel[1] - window.centre[1]);
-            if u.hypot(v) > window.radius {
-                continue;
-            }
-            self.near[1] += 1;
-            empty += usize::from(m.empty);
-            self.near[0] += usize::from(m.good);
-            aligned += usize::from(m.good && m.phase[0].abs().max(m.phase[1].abs()) < 1.0);
-        }
         // Where the net ends in view there may be few tiles about the axis, but not next to none.
-        let all = self.near[1].max(1) as f64;
-        self.good_near = aligned as f64 / (all - empty as f64).max(0.4 * all);
-        self
+        let all = e.near[1].max(1) as f64;
+        e.good_near = aligned_near as f64 / (all - silent_near as f64).max(0.4 * all);
+        e
     }
 
     /// Adds what the average cell looks like.
@@ -133,8 +162,8 @@ impl Evidence {
         let undisputed = logistic((self.good - self.dissent + 0.3 * (second.min(1.0) - 0.45) - 0.3) / 0.02);
         let agreed = undisputed * logistic((self.good_near - 0.38) / 0.03);
         let straight = logistic((3.5 - self.bend.to_degrees()) / 0.4);
-        // Rayleigh, both axes alike. Where sheets are bent, errors are up to twice what the covariance says.
-        let normal = 1.0 - (-0.5 * (5f64.to_radians() / (2.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
+        // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
+        let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
         everywhere.min(here) * twine * alike * agreed * straight * normal
     }
 }

@@ -5,9 +5,10 @@
 //! pixels wide show only a few phases, and bins that stay empty would look like cells that differ. Six are two by three: a lattice of
 //! which only every second, third or fourth line exists shows in waves longer than a cell.
 
+use crate::lockin::Measurement;
 use crate::map::PhaseMap;
 use crate::numeric::wrap;
-use crate::view::{BLOCK, Level};
+use crate::view::{BLOCK, Level, TileGrid};
 
 /// Cells folded side by side.
 const CELLS: usize = 6;
@@ -45,15 +46,29 @@ pub(crate) struct Folder {
 
 impl Folder {
     /// Folds the high-passed picture of a level. Two random halves of it are folded apart and only what they have in common counts, so
-    /// noise adds nothing on average. `cell`: its length on the axis, px of the level; waves beyond the pixels' own limit are left out.
-    pub(crate) fn fold(&mut self, level: &Level, map: &PhaseMap, gain: f32, cell: f64) -> Fold {
+    /// noise adds nothing on average. Only tiles count in which the lattice is, of a grid and the measurements over it: fish repeat with no
+    /// cell, but they would add to every wave. `cell`: its length on the axis, px of the level; waves beyond the pixels' own limit are left
+    /// out.
+    pub(crate) fn fold(
+        &mut self,
+        level: &Level,
+        map: &PhaseMap,
+        gain: f32,
+        grid: &TileGrid,
+        measurements: &[Measurement],
+        cell: f64,
+    ) -> Fold {
         self.sums.clear();
         self.sums.resize(2 * WIDE * WIDE, [0.0; 2]);
         let (bx, by) = level.blocks();
         let bin = |s: f32| (((wrap(s / CELLS as f32) + 0.5) * WIDE as f32) as usize).min(WIDE - 1);
         let mut total = [[0.0; 2]; 2];
         for y in 0..by {
+            let tiles = &measurements[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
             for x in 0..bx {
+                if !tiles[usize::from(grid.column[x])].aligned() {
+                    continue;
+                }
                 let Some([p, q]) = map.block(x, y) else { continue };
                 let half = coin(x, y);
                 let sums = &mut self.sums[half * WIDE * WIDE..][..WIDE * WIDE];

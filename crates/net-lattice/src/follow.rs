@@ -20,11 +20,12 @@ impl Workspace {
         let mut surface = start;
         surface.offset = start.offset.map(|o| o - half);
         let model = last.model.max(Model::Rhomb);
-        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], false)?;
+        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], self.view.centre)?;
         surface.offset = surface.offset.map(|o| o + half);
         let lock = Lock {
             surface,
             start,
+            centre: self.view.centre,
             evidence: last.evidence,
             gain: last.gain * self.view.levels[0].raw.data().len() as f64,
             polarity: last.polarity,

@@ -12,8 +12,10 @@ pub(crate) struct TileSum {
     pub z: [[f64; 2]; 2],
     /// The same at twice its frequency.
     pub z2: [[f64; 2]; 2],
-    /// Sum of squares.
+    /// Sum of squares, clipped.
     pub power: f64,
+    /// The same without clipping.
+    pub whole: f64,
     /// Pixels.
     pub count: f64,
 }
@@ -32,12 +34,20 @@ pub(crate) struct Measurement {
     pub snr: [f64; 2],
     /// Length of the wave vectors, cells per full-resolution px.
     pub k: [f64; 2],
-    /// Demodulated sums.
-    pub z: [[f64; 2]; 2],
+    /// Magnitudes of the waves, and mean square of the high-passed picture without clipping; arbitrary units.
+    pub amplitude: [f64; 2],
+    pub power: f64,
     /// Whether it counts: enough of it shows the sheet, cells there are wider than 3 px, and it is not empty beside the others.
     pub good: bool,
     /// Next to nothing is in it.
     pub empty: bool,
+}
+
+impl Measurement {
+    /// Whether both families are where they were predicted.
+    pub(crate) fn aligned(&self) -> bool {
+        self.good && self.phase[0].abs().max(self.phase[1].abs()) < 1.0
+    }
 }
 
 /// Which part of the picture a lock-in looks at.
@@ -105,7 +115,9 @@ pub(crate) fn demodulate<const SECOND: bool>(
 /// One block's share.
 #[inline]
 fn accumulate<const SECOND: bool>(pixels: &[[f32; 4]; 4], gain: f32, planes: &[Plane; 2], tile: &mut TileSum) {
-    let p = pixels.map(|row| row.map(|i| (i * gain).clamp(-1.0, 1.0)));
+    let p = pixels.map(|row| row.map(|i| i * gain));
+    tile.whole += f64::from(p.iter().flatten().map(|p| p * p).sum::<f32>());
+    let p = p.map(|row| row.map(|i| i.clamp(-1.0, 1.0)));
     let power: f32 = p.iter().flatten().map(|p| p * p).sum();
     tile.power += f64::from(power);
     tile.count += (BLOCK * BLOCK) as f64;
@@ -177,7 +189,8 @@ pub(crate) fn measure(
             phase2: [0.0; 2],
             snr: [0.0; 2],
             k: [f64::INFINITY; 2],
-            z: sum.z,
+            amplitude: sum.z.map(|z| z[0].hypot(z[1]) / sum.count.max(1.0)),
+            power: sum.whole / sum.count.max(1.0),
             good: false,
             empty: false,
         };

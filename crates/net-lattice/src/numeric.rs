@@ -79,6 +79,15 @@ pub(crate) fn magnitude_quantile(values: impl Iterator<Item = f32> + Clone, q: f
     max
 }
 
+/// Magnitude at which a high-passed picture is clipped. Twine is a few standard deviations of what is around it; fish and tags are tens, and
+/// would drown it in every sum. Without noise everything beside the twine is zero, so never less than a tenth of what stands out.
+pub(crate) fn clip_level(values: impl Iterator<Item = f32> + Clone, histogram: &mut Vec<u32>) -> f32 {
+    const SIGMAS: f32 = 4.0;
+    let middle = magnitude_quantile(values.clone(), 0.5, histogram);
+    let high = magnitude_quantile(values, 0.97, histogram);
+    (SIGMAS * 1.4826 * middle).clamp(0.1 * high, high)
+}
+
 /// Median of the values, which it reorders. Zero for none.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)

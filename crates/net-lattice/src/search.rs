@@ -7,7 +7,7 @@
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::numeric::log2_rough;
-use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
+use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE, VARIANCE};
 use crate::view::View;
 
 /// Directions of dual vectors: every 5 degrees of the half circle.
@@ -16,8 +16,6 @@ const DIRECTIONS: usize = 36;
 const TILTS: [f64; 8] = [0.0, 11.0, 22.0, 33.0, 44.0, 54.0, 63.0, 70.0];
 /// Steps of the depth scale to harmonic 1..6.
 const HARMONICS: [usize; 6] = [0, 12, 19, 24, 28, 31];
-/// Variance of a blurred, clipped, whitened bin.
-const VARIANCE: f64 = 0.45;
 /// Whitened power from which a wave's vote grows with the logarithm only.
 const SOFT: f32 = 4.0;
 
@@ -201,7 +199,7 @@ impl Search {
     }
 
     /// The best hypotheses, refined, best first.
-    pub(crate) fn run(&mut self, bank: &Bank, scope: &Scope, per_angle: usize, found: &mut Vec<Candidate>) {
+    pub(crate) fn run(&mut self, bank: &Bank, scope: &Scope, per_octave: usize, found: &mut Vec<Candidate>) {
         self.tabulate(bank);
         let steps = self.steps;
         let step_angle = 180.0 / DIRECTIONS as f64;
@@ -244,15 +242,19 @@ impl Search {
                 }
             }
             best.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+            // Every octave of the cell's size has its best: fish are many waves as long as they are, and would leave no room for short ones.
             let mut kept: Vec<(usize, usize)> = Vec::new();
-            for &(score, n, i, k) in best.iter().take(400) {
+            let octaves = self.depths.end.div_ceil(12);
+            let mut room = vec![per_octave; octaves];
+            for &(score, n, i, k) in &best {
                 let near = |(m, l): &(usize, usize)| {
                     i.abs_diff(*l) <= 1
                         && self.normals[n].column(2).dot(&self.normals[*m].column(2)).clamp(-1.0, 1.0).acos() < 0.2
                 };
-                if kept.iter().any(near) {
+                if room[i / 12] == 0 || kept.iter().any(near) {
                     continue;
                 }
+                room[i / 12] -= 1;
                 kept.push((n, i));
                 let gamma = angle.to_radians();
                 let d = 0.5 * (std::f64::consts::FRAC_PI_2 - gamma);
@@ -260,7 +262,7 @@ impl Search {
                 let rotation = self.normals[n] * Rotation3::new(Vector3::new(0.0, 0.0, roll)).into_inner();
                 let depth = self.base * f64::from(self.power_of_step[i]) * a * gamma.sin();
                 found.push(Candidate { score: f64::from(score), rotation, depth, angle: gamma });
-                if kept.len() >= per_angle {
+                if room.iter().all(|r| *r == 0) {
                     break;
                 }
             }

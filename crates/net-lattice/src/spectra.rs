@@ -8,7 +8,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use crate::numeric::{exp2_rough, log2_rough, magnitude_quantile};
+use crate::numeric::{clip_level, exp2_rough, log2_rough};
 use crate::smooth::Smoother;
 use crate::view::{Site, View};
 
@@ -20,9 +20,14 @@ pub(crate) const COLUMNS: usize = 112;
 pub(crate) const HIGHEST: f64 = 0.42;
 /// Whitened power is clipped here: one strong peak must not outvote the other tiles.
 const CAP: f32 = 12.0;
+/// Variance of a blurred, clipped, whitened bin.
+pub(crate) const VARIANCE: f64 = 0.45;
 /// Noise that every picture is taken to have, of what counts as full contrast in it. Without it a drawn picture without noise is whitened
 /// by the leakage of its own edges.
 const LEAST_NOISE: f32 = 0.01;
+/// Radius, bins, from which the highest of 3 x 3 bins stands for the middle one: steps of the search's grid are constant in the logarithm,
+/// so they are wider there than a peak is.
+const POOLED: f64 = 30.0;
 /// Bins along a side of the blocks from which the noise floor is taken.
 const FLOOR: usize = 4;
 
@@ -41,8 +46,10 @@ pub(crate) struct Bank {
     window: Vec<f32>,
     /// Whitened power, expected value 1 without a net: tile, column (fx from 0), row (fy + SIZE / 2).
     pub power: Vec<f32>,
-    /// The same blurred by a bin and clipped, less 1.
+    /// The same as coarse as the search's grid: blurred by a bin, clipped, the highest of the neighbourhood far from the middle, less its mean.
     pub coarse: Vec<f32>,
+    /// Whether a bin is farther from the middle than [`POOLED`].
+    far: Vec<bool>,
     /// Radius class of each block of bins.
     radius: Vec<u16>,
 }
@@ -62,6 +69,7 @@ pub(crate) struct Spectra {
     log: Vec<f32>,
     histogram: Vec<u32>,
     high: Image<f32>,
+    pooled: Vec<f32>,
 }
 
 const BX: usize = COLUMNS / FLOOR;
@@ -110,7 +118,9 @@ impl Bank {
                 (x.hypot(y) / FLOOR as f64) as u16
             })
             .collect();
+        let far = |b: usize| ((b / SIZE) as f64).hypot((b % SIZE) as f64 - SIZE as f64 / 2.0) >= POOLED;
         Some(Self {
+            far: (0..COLUMNS * SIZE).map(far).collect(),
             level,
             length,
             corners,
@@ -151,6 +161,7 @@ impl Spectra {
             log: Vec::new(),
             histogram: Vec::new(),
             high: Image::default(),
+            pooled: Vec::new(),
         }
     }
 
@@ -158,7 +169,7 @@ impl Spectra {
     pub(crate) fn compute(&mut self, view: &View, bank: &mut Bank, smoother: &mut Smoother) {
         let level = &view.levels[bank.level];
         smoother.subtract_blur(&level.raw, (bank.smooth_px / level.scale) as f32, &mut self.high);
-        let clip = magnitude_quantile(self.high.data().iter().copied(), 0.98, &mut self.histogram).max(1e-9);
+        let clip = clip_level(self.high.data().iter().copied(), &mut self.histogram).max(1e-9);
         let gain = 1.0 / clip;
         for p in self.high.data_mut() {
             *p = (*p * gain).clamp(-1.0, 1.0);
@@ -249,7 +260,9 @@ impl Spectra {
                     out[SIZE / 2 - low..=SIZE / 2 + low].fill(1.0);
                 }
             }
-            blur_clip(out, &mut bank.coarse[t * COLUMNS * SIZE..][..COLUMNS * SIZE], &mut self.line);
+            let coarse = &mut bank.coarse[t * COLUMNS * SIZE..][..COLUMNS * SIZE];
+            blur_clip(out, coarse, &mut self.line);
+            pool(coarse, &bank.far, &mut self.pooled);
         }
     }
 
@@ -313,6 +326,40 @@ fn blur_clip(power: &[f32], out: &mut [f32], line: &mut [f32]) {
         }
         out[0] = 0.0;
         out[SIZE - 1] = 0.0;
+    }
+}
+
+/// Puts the highest of the neighbourhood in place of bins far from the middle, less what that is on average, with the same variance.
+fn pool(coarse: &mut [f32], far: &[bool], pooled: &mut Vec<f32>) {
+    highest(coarse, pooled);
+    let (mut n, mut sum, mut square) = (0.0f64, 0.0f64, 0.0f64);
+    for (p, _) in pooled.iter().zip(far).filter(|(_, far)| **far) {
+        n += 1.0;
+        sum += f64::from(*p);
+        square += f64::from(p * p);
+    }
+    let mean = sum / n.max(1.0);
+    let scale = f64::sqrt(VARIANCE / (square / n.max(1.0) - mean * mean).max(1e-6)).min(1.0) as f32;
+    for ((c, p), _) in coarse.iter_mut().zip(pooled.iter()).zip(far).filter(|(_, far)| **far) {
+        *c = (p - mean as f32) * scale;
+    }
+}
+
+/// The highest of 3 x 3 bins.
+fn highest(from: &[f32], to: &mut Vec<f32>) {
+    to.clear();
+    to.resize(from.len(), 0.0);
+    for x in 0..COLUMNS {
+        let column = |x: usize| &from[x * SIZE..][..SIZE];
+        let (a, b, c) = (column(if x == 0 { 1 } else { x - 1 }), column(x), column((x + 1).min(COLUMNS - 1)));
+        let across = |y: usize| a[y].max(b[y]).max(c[y]);
+        let out = &mut to[x * SIZE..][..SIZE];
+        let (mut before, mut here) = (across(0), across(0));
+        for y in 0..SIZE {
+            let after = across((y + 1).min(SIZE - 1));
+            out[y] = before.max(here).max(after);
+            (before, here) = (here, after);
+        }
     }
 }
 

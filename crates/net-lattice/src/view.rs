@@ -211,7 +211,13 @@ impl View {
         usize::from(cell >= 30.0 * self.size)
     }
 
-    /// Length scale, full-resolution px, of the high-pass filter for a cell of that many px.
+    /// Length scale, full-resolution px, of the high-pass filter of the lock-in: shorter than the other, so that of a fish only its outline
+    /// is left, and still longer than what twine is wide.
+    pub(crate) fn thin_px(&self, cell: f64) -> f64 {
+        (0.3 * cell).max(4.0 * self.size.max(self.reduction as f64))
+    }
+
+    /// Length scale, full-resolution px, of the high-pass filter of the drawing's comparison for a cell of that many px.
     pub(crate) fn high_pass_px(&self, cell: f64) -> f64 {
         (0.9 * cell).max(8.0 * self.size.max(self.reduction as f64))
     }

@@ -7,12 +7,12 @@ use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
-use crate::fold::Folder;
+use crate::fold::{Fold, Folder};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
 use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
 use crate::model::Model;
-use crate::numeric::magnitude_quantile;
+use crate::numeric::clip_level;
 use crate::search::{Candidate, Scope, Search};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
@@ -22,6 +22,14 @@ use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
 const WEAK: f64 = 0.05;
+/// Standard deviation of the window in which a lock-in starts, px of an 848 x 480 px picture.
+const SEED: f64 = 110.0;
+/// The same of how much less a place counts for starting the farther off the axis it is.
+const CENTRAL: f64 = 500.0;
+/// What counts as near the optical axis, px of an 848 x 480 px picture.
+const NEAR: f64 = 220.0;
+/// Power of a wave over that of noise from which it is clear.
+const LOUD: f64 = 12.0;
 /// Smallest cell, full-resolution px on the axis, that is looked for.
 pub(crate) const SMALLEST_CELL: f64 = 3.7;
 
@@ -66,6 +74,8 @@ pub(crate) struct Lock {
     pub surface: Surface,
     /// What the search gave to lock to.
     pub start: Surface,
+    /// Where it started, full-resolution px.
+    pub centre: [f64; 2],
     pub evidence: Evidence,
     pub gain: f64,
     pub polarity: Polarity,
@@ -77,7 +87,7 @@ impl Workspace {
         let mut banks = Vec::new();
         let reduction = view.reduction as f64;
         // Tiles of 160 px for cells up to 60 px, of 360 px for those up to 136 px (848 x 480 px).
-        for (half, length, columns, rows, smooth) in [(0, 160.0, 9, 5, 25.0), (1, 360.0, 5, 2, 60.0)] {
+        for (half, length, columns, rows, smooth) in [(0, 160.0, 9, 5, 10.0), (1, 360.0, 5, 2, 24.0)] {
             let level = half.min(view.levels.len() - 1);
             let scale = view.levels[level].scale;
             let tile = length * view.size / scale;
@@ -125,14 +135,13 @@ impl Workspace {
         self.view.focal * self.scope.sides[0].min(self.scope.sides[1]) / depth
     }
 
-    /// Makes sure that `high` of a level is filtered for cells of `cell` px; returns the lock-in's gain.
-    pub(crate) fn high(&mut self, level: usize, cell: f64) -> f32 {
-        let sigma = self.view.high_pass_px(cell);
+    /// Makes sure that `high` of a level is what is finer than `sigma` full-resolution px; returns the lock-in's gain.
+    pub(crate) fn high(&mut self, level: usize, sigma: f64) -> f32 {
         let t = &mut self.tools;
         if (t.high[level].0 / sigma - 1.0).abs() > 0.02 {
             self.view.high_pass(level, sigma, &mut t.smoother);
             let high = self.view.levels[level].high.data();
-            let q = magnitude_quantile(high.iter().copied(), 0.97, &mut t.histogram);
+            let q = clip_level(high.iter().copied(), &mut t.histogram);
             t.high[level] = (sigma, 1.0 / (q + 1e-9));
         }
         t.high[level].1
@@ -151,7 +160,7 @@ impl Workspace {
         sign: f64,
         window: &Window,
     ) {
-        let gain = self.high(place.0, self.cell_px(surface.depth));
+        let gain = self.high(place.0, self.view.thin_px(self.cell_px(surface.depth)));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
@@ -159,31 +168,62 @@ impl Workspace {
         measure(surface, &self.view, place, sign, gain, &t.sums, &mut t.scratch, &mut t.measurements);
     }
 
+    /// What the last measurements say for the lattice.
+    pub(crate) fn evidence(&mut self) -> Evidence {
+        let near = self.window(NEAR);
+        Evidence::new(&self.tools.measurements, near, &mut self.tools.scratch)
+    }
+
+    /// All cells on top of each other, where the last measurements found the lattice; those of `place` and this surface.
+    pub(crate) fn fold(&mut self, surface: &Surface, place: (usize, usize)) -> Fold {
+        let gain = self.tools.high[place.0].1;
+        let level = &self.view.levels[place.0];
+        let cell = self.short_px(surface.depth) / level.scale;
+        let t = &mut self.tools;
+        t.folder.fold(level, &t.map, gain, &level.tiles[place.1], &t.measurements, cell)
+    }
+
     /// A window about the optical axis, radius in px of an 848 x 480 px picture.
     pub(crate) fn window(&self, radius: f64) -> Window {
         Window { centre: self.view.centre, radius: radius * self.view.size }
     }
 
-    /// Lock-in and fit with a growing window. The measurements left behind are those of the last pass, before its step.
-    pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], fresh: bool) -> Option<Surface> {
-        let mut surface = *start;
-        let place = self.scale_for(surface.depth);
-        if fresh {
-            surface.offset = [0.0; 2];
-            let window = self.window(110.0);
-            self.measure::<false>(&surface, (place.0, 0), 1.0, &window);
-            for f in 0..2 {
-                let mut sum = [0.0; 2];
-                for m in self.tools.measurements.iter().filter(|m| m.good) {
-                    let w = window.weight(m.site.pixel);
-                    sum[0] += w * m.z[f][0];
-                    sum[1] += w * m.z[f][1];
+    /// Where in the picture the waves of a predicted sheet are seen best: there a lock-in starts. The sheet is moved to fit there. A fish on
+    /// the optical axis hides no net beside it.
+    pub(crate) fn seed(&mut self, surface: &mut Surface) -> [f64; 2] {
+        surface.offset = [0.0; 2];
+        self.measure::<false>(surface, (self.scale_for(surface.depth).0, 0), 1.0, &Window::ALL);
+        let measurements = &self.tools.measurements;
+        let mut best = (f64::NEG_INFINITY, self.view.centre, [0.0; 2]);
+        for place in measurements.iter().filter(|m| m.good) {
+            let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
+            let mut sum = [[0.0; 2]; 2];
+            for m in measurements.iter().filter(|m| m.good) {
+                let w = window.weight(m.site.pixel);
+                for f in 0..2 {
+                    // A tile has as much say as its wave is clear; how strong it is says more of fish.
+                    let say = w * m.snr[f].min(LOUD).sqrt();
+                    sum[f][0] += say * m.phase[f].cos();
+                    sum[f][1] += say * m.phase[f].sin();
                 }
-                surface.offset[f] = sum[1].atan2(sum[0]) / std::f64::consts::TAU;
+            }
+            let clear = sum.map(|z| z[0].hypot(z[1]));
+            // Range and normal are those on the axis: the nearer the better.
+            let score = clear[0].min(clear[1]) * self.window(CENTRAL).weight(place.site.pixel);
+            if score > best.0 {
+                best = (score, place.site.pixel, sum.map(|z| z[1].atan2(z[0]) / std::f64::consts::TAU));
             }
         }
+        surface.offset = best.2;
+        best.1
+    }
+
+    /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
+    pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], centre: [f64; 2]) -> Option<Surface> {
+        let mut surface = *start;
+        let place = self.scale_for(surface.depth);
         for &(radius, model) in schedule {
-            let window = self.window(radius);
+            let window = Window { centre, radius: radius * self.view.size };
             self.measure::<false>(&surface, place, 1.0, &window);
             let t = &mut self.tools;
             t.observations.clear();
@@ -231,7 +271,7 @@ impl Workspace {
         polarities: &[Polarity],
         blurs: &[f64],
     ) -> (f64, Polarity, f64) {
-        self.high(level, cell);
+        self.high(level, self.view.high_pass_px(cell));
         let area = self.view.levels[level].scale.powi(2);
         let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
         self.tools.map.fill(surface, &self.view.levels[level]);
@@ -262,7 +302,7 @@ impl Workspace {
         let cell = self.cell_px(surface.depth);
         let level = self.view.level_for(self.short_px(surface.depth), 20.0);
         let tiling = self.view.tiling_for(cell);
-        self.high(level, cell);
+        self.high(level, self.view.high_pass_px(cell));
         let drawing = self.drawing(level, cell, lock.polarity, lock.blur);
         let t = &mut self.tools;
         let view = &self.view.levels[level];
