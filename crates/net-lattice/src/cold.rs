@@ -5,13 +5,14 @@ use net_geometry::nalgebra::{Rotation3, Vector3};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::LatticeEstimate;
+use crate::fit::{Observation, Robust};
 use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
 use crate::search::{self, Candidate};
 use crate::stages::Stages;
 use crate::surface::Surface;
-use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
+use crate::workspace::{LOUDEST, Lock, SMALLEST_CELL, Workspace};
 
 /// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
 const COLD: [(f64, Model); 7] = [
@@ -101,6 +102,13 @@ impl Workspace {
         }
         let first = best;
         let mut top = self.agreement(&first.surface).0;
+        if let Some(surface) = self.counted_out(&first) {
+            let (score, evidence) = self.agreement(&surface);
+            if score > top {
+                top = score;
+                best = Lock { surface, evidence, ..first };
+            }
+        }
         for (x, y) in [(0.0, 0.0), (OTHER, 0.0), (-OTHER, 0.0), (0.0, OTHER), (0.0, -OTHER)] {
             let turn = Rotation3::new(Vector3::new(x, y, 0.0)).into_inner();
             let s = &first.surface;
@@ -123,11 +131,32 @@ impl Workspace {
         best
     }
 
+    /// The sheet fitted to phases whose whole cycles are counted from tile to tile, and locked again.
+    fn counted_out(&mut self, lock: &Lock) -> Option<Surface> {
+        let place = self.scale_for(lock.surface.depth);
+        self.measure::<false>(&lock.surface, place, 1.0, &Window::ALL);
+        let t = &mut self.tools;
+        t.unwrapper.run(&t.measurements, self.view.levels[place.0].tiles[place.1].nx);
+        t.observations.clear();
+        for (m, cycles) in t.measurements.iter().zip(&t.unwrapper.cycles) {
+            let cycles = cycles.filter(|_| !m.empty);
+            let w = |f: usize| cycles.map_or(0.0, |_| m.snr[f].min(LOUDEST) * std::f64::consts::TAU.powi(2));
+            let c = cycles.unwrap_or_default();
+            let s = [m.predicted.s[0] + c[0], m.predicted.s[1] + c[1]];
+            t.observations.push(Observation { site: m.site, s, weight: [w(0), 0.0, w(1)] });
+        }
+        let robust = Robust::Family(0.25);
+        let fit = t.fitter.fit(&lock.surface, Model::Quartic.parameters(), &t.observations, robust, &self.prior, 5)?;
+        self.lock(&fit.surface, &COLD[5..], lock.centre)
+    }
+
     /// How well the tiles agree with a locked sheet, in both harmonics; the second is never fitted.
     fn agreement(&mut self, surface: &Surface) -> (f64, Evidence) {
         self.measure::<true>(surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
         let e = self.evidence();
-        (e.v[0].min(e.v[1]) + e.v2[0].abs().min(e.v2[1].abs()), e)
+        // Range and normal are claimed on the axis: what agrees there counts twice.
+        let harmonics = e.v[0].min(e.v[1]) + e.v2[0].abs().min(e.v2[1].abs());
+        (harmonics * (1.0 + e.good_near), e)
     }
 
     /// Tests the rival periods; returns the best, and the share of its gain by which the second falls short.

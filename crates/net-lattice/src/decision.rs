@@ -157,10 +157,12 @@ impl Evidence {
         let limit = (0.01 + 0.2 * self.balance).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.012);
         // A bright tag on a net is a lattice of its own: the strong waves beside it contradict, and half of the tiles are off. Growth puts
-        // tiles off as well, but leaves their second harmonics.
+        // tiles off as well, but leaves their second harmonics. A bent sheet can settle a cycle off where tiles are missing; a flat one
+        // cannot, and less of it must agree.
+        let (most, enough) = if self.bend > 0.0 { (0.42, 0.52) } else { (0.3, 0.38) };
         let second = v2 / f64::sqrt(2.0 * self.tiles2.max(1) as f64);
-        let undisputed = logistic((self.good - self.dissent + 0.3 * (second.min(1.0) - 0.45) - 0.3) / 0.02);
-        let agreed = undisputed * logistic((self.good_near - 0.38) / 0.03);
+        let undisputed = logistic((self.good - self.dissent + 0.3 * (second.min(1.0) - 0.45) - most) / 0.02);
+        let agreed = undisputed * logistic((self.good_near - enough) / 0.03);
         let straight = logistic((3.5 - self.bend.to_degrees()) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();

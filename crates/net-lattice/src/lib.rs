@@ -68,6 +68,7 @@ mod spectra;
 mod stages;
 mod surface;
 mod template;
+mod unwrap;
 mod view;
 mod workspace;
 

@@ -18,6 +18,7 @@ use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
 use crate::stages::Stages;
 use crate::surface::{self, Params, Surface};
+use crate::unwrap::Unwrapper;
 use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
@@ -28,6 +29,8 @@ const SEED: f64 = 110.0;
 const CENTRAL: f64 = 500.0;
 /// What counts as near the optical axis, px of an 848 x 480 px picture.
 const NEAR: f64 = 220.0;
+/// Power of a wave over that of noise from which more adds no weight: knots are not where a perfect lattice has them.
+pub(crate) const LOUDEST: f64 = 60.0;
 /// Power of a wave over that of noise from which it is clear.
 const LOUD: f64 = 12.0;
 /// Smallest cell, full-resolution px on the axis, that is looked for.
@@ -64,6 +67,7 @@ pub(crate) struct Tools {
     pub scratch: Vec<f64>,
     pub scores: Vec<(usize, Params)>,
     pub folder: Folder,
+    pub unwrapper: Unwrapper,
     /// What `high` of each level holds: filter length, and the gain of the lock-in.
     pub high: [(f64, f32); 4],
 }
@@ -232,7 +236,7 @@ impl Workspace {
                     if !m.good || m.snr[f] <= 3.0 {
                         return 0.0;
                     }
-                    m.snr[f].min(60.0)
+                    m.snr[f].min(LOUDEST)
                         * if m.empty { WEAK } else { 1.0 }
                         * window.weight(m.site.pixel)
                         * std::f64::consts::TAU.powi(2)
