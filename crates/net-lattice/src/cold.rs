@@ -9,7 +9,7 @@ use crate::fit::{Observation, Robust};
 use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
-use crate::search::{self, Candidate};
+use crate::search;
 use crate::stages::Stages;
 use crate::surface::Surface;
 use crate::workspace::{LOUDEST, Lock, SMALLEST_CELL, Workspace};
@@ -37,7 +37,8 @@ const OTHER: f64 = 0.16;
 impl Workspace {
     pub(crate) fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
         self.search();
-        let mut locks: Vec<Lock> = Vec::new();
+        let mut locks = std::mem::take(&mut self.locks);
+        locks.clear();
         for k in 0..self.candidates.len().min(CANDIDATES.1) {
             let c = self.candidates[k];
             if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
@@ -58,31 +59,32 @@ impl Workspace {
                 break;
             }
         }
-        let lock = self.best_lock(locks)?;
+        let lock = self.best_lock(&mut locks);
+        self.locks = locks;
+        let lock = lock?;
         let lock = self.elsewhere(lock);
         let (lock, margin) = self.true_cell(lock)?;
         self.stages = Some(Stages::new(&lock));
         self.finish(config, lock, margin)
     }
     fn search(&mut self) {
-        let mut found = Vec::new();
-        let mut refined: Vec<Candidate> = Vec::new();
+        let (found, refined) = (&mut self.found, &mut self.candidates);
+        refined.clear();
         for (bank, search) in &mut self.banks {
             self.spectra.compute(&self.view, bank, &mut self.tools.smoother);
             found.clear();
-            search.run(bank, &self.scope, 3, &mut found);
+            search.run(bank, &self.scope, 3, found);
             let scale = self.view.levels[bank.level].scale;
             found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
             let range = search.depths_m(self.scope.sides[0]);
-            search::add_rivals(bank, scale, &self.scope, range, &mut found);
-            refined.append(&mut found);
+            search::add_rivals(bank, scale, &self.scope, range, found);
+            refined.append(found);
         }
-        search::distinct(&mut refined);
-        self.candidates = refined;
+        search::distinct(refined);
     }
 
     /// Gain decides between periods, coherence between candidates of the same period: a cycle slip at the rim costs coherence, hardly gain.
-    fn best_lock(&self, mut locks: Vec<Lock>) -> Option<Lock> {
+    fn best_lock(&self, locks: &mut [Lock]) -> Option<Lock> {
         let v = |l: &Lock| l.evidence.v[0].abs().min(l.evidence.v[1].abs());
         let score = |l: &Lock| l.gain * if v(l) > 3.5 { 1.0 } else { 0.05 };
         locks.sort_by(|a, b| score(b).total_cmp(&score(a)));
@@ -163,15 +165,16 @@ impl Workspace {
     fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64)> {
         let cell = self.short_px(lock.surface.depth);
         let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
-        let possible =
-            |m: &f64| *m == 1.0 || (cell / m > SMALLEST_CELL * 0.9 * self.view.reduction as f64 && cell / m < span);
-        let rivals: Vec<f64> = RIVALS.into_iter().filter(possible).collect();
-        let (first, last) = (*rivals.first()?, *rivals.last()?);
+        let smallest = SMALLEST_CELL * 0.9 * self.view.reduction as f64;
+        let possible = |m: &f64| *m == 1.0 || (cell / m > smallest && cell / m < span);
+        let (first, last) = (RIVALS.into_iter().find(possible)?, RIVALS.into_iter().rev().find(possible)?);
         let widest = self.cell_px(lock.surface.depth * first);
         let level = self.view.level_for(cell / last, 6.0);
-        let mut all: Vec<(f64, f64, Lock)> = Vec::new();
+        // The best and the second of them by gain, with the rival's period.
+        let mut best: Option<(f64, f64, Lock)> = None;
+        let (mut second, mut tested) = (0.0, 0);
         let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
-        for m in rivals {
+        for m in RIVALS.into_iter().filter(possible) {
             let mut centre = lock.centre;
             let surface = if m == 1.0 {
                 lock.surface
@@ -191,15 +194,18 @@ impl Workspace {
             let place = (level, self.view.tiling_for(self.cell_px(surface.depth)));
             self.measure::<false>(&surface, place, 1.0, &Window::ALL);
             let all_there = 1.0 - (2.0 * self.fold(&surface, place).unlike).min(1.0);
-            all.push((
-                gain * if gain > 0.0 { all_there } else { 1.0 },
-                m,
-                Lock { surface, start: lock.start.scaled(m), centre, gain, polarity, blur, ..lock },
-            ));
+            let worth = gain * if gain > 0.0 { all_there } else { 1.0 };
+            let rival = Lock { surface, start: lock.start.scaled(m), centre, gain, polarity, blur, ..lock };
+            match &best {
+                Some((top, ..)) if worth <= *top => second = if tested == 1 { worth } else { f64::max(second, worth) },
+                before => {
+                    second = before.as_ref().map_or(0.0, |b| b.0);
+                    best = Some((worth, m, rival));
+                }
+            }
+            tested += 1;
         }
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (gain, m, mut best) = *all.first()?;
-        let second = all.get(1).map_or(0.0, |a| a.0);
+        let (gain, m, mut best) = best?;
         if m != 1.0
             && let Some(s) = self.lock(&best.surface, &COLD[2..], best.centre)
         {
@@ -239,7 +245,9 @@ impl Workspace {
         if let Some((fit, _)) = self.likelihood(&surface, &lock, model, 3) {
             surface = fit.surface;
             let t = &mut self.tools;
-            if let Some(choice) = model::choose(&mut t.fitter, &surface, &t.observations, &self.prior, Model::Bent) {
+            if let Some(choice) =
+                model::choose(&mut t.fitter, &surface, &t.observations, &self.prior, Model::Bent, &mut t.scratch)
+            {
                 surface = choice.fit.surface;
                 model = choice.model;
             }

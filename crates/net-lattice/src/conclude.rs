@@ -1,7 +1,7 @@
 //! The end of every picture: last passes on the drawing, evidence, covariance, and the result in the net frame.
 
 use net_geometry::Plane;
-use net_geometry::nalgebra::Vector3;
+use net_geometry::nalgebra::{Matrix3, Vector3};
 
 use crate::config::Config;
 use crate::covariance;
@@ -33,7 +33,7 @@ impl Workspace {
         let reach =
             REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
         let t = &mut self.tools;
-        let scale = model::robust_scale(&t.fitter.whitened(&t.observations));
+        let scale = model::robust_scale(t.fitter.whiten(&t.observations), &mut t.scratch);
         let c = covariance::parameters(
             &t.fitter,
             &surface,
@@ -84,25 +84,24 @@ impl Workspace {
             return tangent;
         }
         let chart = surface.chart();
-        let mut points: Vec<Vector3<f64>> = Vec::new();
+        let (mut n, mut sum, mut square) = (0.0, Vector3::zeros(), Matrix3::zeros());
         for site in &self.view.levels[0].tiles[0].sites {
             let (u, v) = (site.pixel[0] - self.view.centre[0], site.pixel[1] - self.view.centre[1]);
             if !site.valid || u.hypot(v) > 220.0 * self.view.size {
                 continue;
             }
             if let Some(p) = chart.at(site.ray[0], site.ray[1]) {
-                points.push(Vector3::new(site.ray[0], site.ray[1], 1.0) * p.depth);
+                let point = Vector3::new(site.ray[0], site.ray[1], 1.0) * p.depth;
+                n += 1.0;
+                sum += point;
+                square += point * point.transpose();
             }
         }
-        if points.len() < 6 {
+        if n < 6.0 {
             return tangent;
         }
-        let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-        let mut scatter = net_geometry::nalgebra::Matrix3::zeros();
-        for p in &points {
-            scatter += (p - mean) * (p - mean).transpose();
-        }
-        let eigen = scatter.symmetric_eigen();
+        let mean: Vector3<f64> = sum / n;
+        let eigen = (square / n - mean * mean.transpose()).symmetric_eigen();
         let mut normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
         if normal.z < 0.0 {
             normal = -normal;

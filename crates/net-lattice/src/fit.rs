@@ -63,6 +63,7 @@ pub(crate) struct Fitter {
     depth: Vec<f64>,
     /// Residuals of the last iteration, before its step; NaN where the sheet is not seen.
     pub residuals: Vec<[f64; 2]>,
+    whitened: Vec<f64>,
 }
 
 /// Finite-difference steps, in the order of the parameters.
@@ -148,13 +149,14 @@ impl Fitter {
     }
 
     /// Magnitudes of the last residuals in units of what the observations claim.
-    pub(crate) fn whitened(&self, observations: &[Observation]) -> Vec<f64> {
+    pub(crate) fn whiten(&mut self, observations: &[Observation]) -> &[f64] {
         let seen = observations.iter().zip(&self.residuals).filter(|(_, r)| !r[0].is_nan());
-        seen.map(|(o, r)| {
+        self.whitened.clear();
+        self.whitened.extend(seen.map(|(o, r)| {
             let [a, b, c] = o.weight;
             (a * r[0] * r[0] + 2.0 * b * r[0] * r[1] + c * r[1] * r[1]).max(0.0).sqrt()
-        })
-        .collect()
+        }));
+        &self.whitened
     }
 
     /// Gradient that a change of the predicted coordinates would make in the normal equations of the last linearization: J' W change.

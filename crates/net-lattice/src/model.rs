@@ -51,6 +51,7 @@ pub(crate) fn choose(
     observations: &[Observation],
     prior: &Prior,
     richest: Model,
+    scratch: &mut Vec<f64>,
 ) -> Option<Choice> {
     let mut best: Option<(f64, Choice)> = None;
     for model in Model::ALL.into_iter().rev().filter(|m| *m <= richest) {
@@ -58,12 +59,12 @@ pub(crate) fn choose(
         let from = start.truncated(count, prior.angle);
         let Some(fit) = fitter.fit(&from, count, observations, Robust::Tile(0.08), prior, 6) else { continue };
         // Residuals are those before the last step; six steps are past convergence.
-        let whitened = fitter.whitened(observations);
+        let whitened = fitter.whiten(observations);
         let n = 2 * whitened.len();
         if n < count + 6 {
             continue;
         }
-        let scale = robust_scale(&whitened);
+        let scale = robust_scale(whitened, scratch);
         let cost: f64 =
             whitened.iter().map(|s| 2.0 * (0.25 * (s / scale).powi(2)).ln_1p()).sum::<f64>() + n as f64 * scale.ln();
         let bic = 2.0 * cost + count as f64 * (n as f64).ln();
@@ -74,10 +75,11 @@ pub(crate) fn choose(
     best.map(|b| b.1)
 }
 
-/// Scale of two-component whitened residuals by a Cauchy-type iteration from their median.
-pub(crate) fn robust_scale(whitened: &[f64]) -> f64 {
-    let mut sorted = whitened.to_vec();
-    let mut s = crate::numeric::median(&mut sorted) + 1e-9;
+/// Scale of two-component whitened residuals by a Cauchy-type iteration from their median. `scratch` is overwritten.
+pub(crate) fn robust_scale(whitened: &[f64], scratch: &mut Vec<f64>) -> f64 {
+    scratch.clear();
+    scratch.extend_from_slice(whitened);
+    let mut s = crate::numeric::median(scratch) + 1e-9;
     for _ in 0..20 {
         let (mut sum, mut weight) = (0.0, 1e-9);
         for x in whitened {

@@ -67,6 +67,18 @@ pub(crate) struct Search {
     sums: Vec<f32>,
     counts: Vec<u16>,
     scores: Vec<f32>,
+    ranking: Ranking,
+}
+
+/// Buffers for ranking hypotheses.
+#[derive(Default)]
+struct Ranking {
+    /// Score, normal, step of the depth, direction.
+    best: Vec<(f32, usize, usize, usize)>,
+    /// Normals and depths of those that are kept.
+    kept: Vec<(usize, usize)>,
+    /// How many more each octave of the depth may keep.
+    room: Vec<usize>,
 }
 
 fn basis(tilt: f64, azimuth: f64) -> Matrix3<f64> {
@@ -151,6 +163,7 @@ impl Search {
             power_of_step: (0..steps).map(|k| (k as f64 / 12.0).exp2() as f32).collect(),
             sums: vec![0.0; cells * steps],
             scores: vec![0.0; cells * steps],
+            ranking: Ranking::default(),
             normals,
             tiles,
             walks,
@@ -205,20 +218,18 @@ impl Search {
         let step_angle = 180.0 / DIRECTIONS as f64;
         let nominal = scope.angle.to_degrees();
         let spread = (1.5 * scope.angle_sigma.to_degrees()).min(15.0);
-        let mut angles: Vec<f64> = [nominal, nominal - spread, nominal + spread]
-            .into_iter()
-            .map(|a| (a / step_angle).round() * step_angle)
-            .filter(|a| (20.0..=160.0).contains(a))
-            .collect();
-        angles.dedup();
+        let angles = [0.0, -spread, spread].map(|d| ((nominal + d) / step_angle).round() * step_angle);
+        // Without a spread all three are one.
+        let angles = if angles[1] == angles[0] { &angles[..1] } else { &angles[..] };
         let [a, b] = scope.sides;
         // A quarter turn changes nothing on a square mesh but the crossing angle's name.
         let square = (a / b - 1.0).abs() < 1e-6 && (nominal - 90.0).abs() < 1e-6;
         let shift = (12.0 * (a / b).log2()).round() as isize;
-        for &angle in &angles {
+        let Ranking { best, kept, room } = &mut self.ranking;
+        for &angle in angles.iter().filter(|a| (20.0..=160.0).contains(*a)) {
             let half_skew = 0.5 * (90.0 - angle);
             let turn = ((180.0 - angle) / step_angle).round() as usize;
-            let mut best: Vec<(f32, usize, usize, usize)> = Vec::new();
+            best.clear();
             for n in 0..self.normals.len() {
                 for i in self.depths.clone() {
                     let j = i as isize + shift;
@@ -243,10 +254,10 @@ impl Search {
             }
             best.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
             // Every octave of the cell's size has its best: fish are many waves as long as they are, and would leave no room for short ones.
-            let mut kept: Vec<(usize, usize)> = Vec::new();
-            let octaves = self.depths.end.div_ceil(12);
-            let mut room = vec![per_octave; octaves];
-            for &(score, n, i, k) in &best {
+            kept.clear();
+            room.clear();
+            room.resize(self.depths.end.div_ceil(12), per_octave);
+            for &(score, n, i, k) in best.iter() {
                 let near = |(m, l): &(usize, usize)| {
                     i.abs_diff(*l) <= 1
                         && self.normals[n].column(2).dot(&self.normals[*m].column(2)).clamp(-1.0, 1.0).acos() < 0.2
@@ -378,7 +389,7 @@ pub(crate) fn refine(bank: &Bank, scale: f64, scope: &Scope, start: &Candidate) 
 
 /// Depths at which the same picture scores nearly as well, because harmonics coincide: refined, and added when they do.
 pub(crate) fn add_rivals(bank: &Bank, scale: f64, scope: &Scope, range: (f64, f64), found: &mut Vec<Candidate>) {
-    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    found.sort_unstable_by(|a, b| b.score.total_cmp(&a.score).then(a.depth.total_cmp(&b.depth)));
     for k in 0..found.len().min(3) {
         let best = found[k];
         for m in [0.5, 2.0 / 3.0, 1.5, 2.0, 3.0, 4.0] {
@@ -397,20 +408,22 @@ pub(crate) fn add_rivals(bank: &Bank, scale: f64, scope: &Scope, range: (f64, f6
 
 /// Sorts by score and drops near copies.
 pub(crate) fn distinct(found: &mut Vec<Candidate>) {
-    found.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut kept: Vec<Candidate> = Vec::new();
-    for c in found.iter() {
+    found.sort_unstable_by(|a, b| b.score.total_cmp(&a.score).then(a.depth.total_cmp(&b.depth)));
+    let mut kept = 0;
+    for i in 0..found.len() {
+        let c = found[i];
         let same = |k: &Candidate| {
             (c.depth / k.depth).ln().abs() < 0.03
                 && c.rotation.column(2).dot(&k.rotation.column(2)).clamp(-1.0, 1.0).acos() < 0.06
                 && (c.angle - k.angle).abs() < 0.05
                 && c.rotation.column(0).dot(&k.rotation.column(0)).abs() > 0.98
         };
-        if !kept.iter().any(same) {
-            kept.push(*c);
+        if !found[..kept].iter().any(same) {
+            found[kept] = c;
+            kept += 1;
         }
     }
-    *found = kept;
+    found.truncate(kept);
 }
 
 impl std::fmt::Debug for Search {

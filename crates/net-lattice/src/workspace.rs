@@ -45,6 +45,9 @@ pub(crate) struct Workspace {
     pub scope: Scope,
     pub prior: Prior,
     pub candidates: Vec<Candidate>,
+    /// Those of one bank.
+    pub found: Vec<Candidate>,
+    pub locks: Vec<Lock>,
     /// Twine diameter, m.
     pub twine: f64,
     /// What the next picture starts from.
@@ -116,6 +119,8 @@ impl Workspace {
             spectra: Spectra::new(),
             tools: Tools::default(),
             candidates: Vec::new(),
+            found: Vec::new(),
+            locks: Vec::new(),
             twine: config.twine_diameter_m,
             last: None,
             stages: None,
@@ -317,9 +322,9 @@ impl Workspace {
         for _ in 0..passes {
             t.map.fill(&surface, view);
             t.likelihood.observe(&surface, &t.map, &drawing, &view.tiles[tiling], &mut t.smoother, &mut t.observations);
-            let mut shifts: Vec<f64> =
-                t.likelihood.shifts.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
-            let scale = (3.0 * 1.4826 * crate::numeric::median(&mut shifts)).max(0.01);
+            t.scratch.clear();
+            t.scratch.extend(t.likelihood.shifts.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()));
+            let scale = (3.0 * 1.4826 * crate::numeric::median(&mut t.scratch)).max(0.01);
             let robust = Robust::Tile(scale);
             let done = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?;
             surface = done.surface;
