@@ -11,8 +11,9 @@ use crate::error::Result;
 use crate::estimate::NetPose;
 use crate::method::{Found, Track};
 
-/// Probability from which a pose is vouched for: where the sections' disagreement reaches its limit.
-pub(crate) const PROBABILITY_THRESHOLD: f64 = 0.5;
+/// Probability from which a pose is vouched for. On random scenes of the simulator (`net-fft`, `examples/study.rs`) 0.7 refuses 3 right poses in 188 more than 0.5 would, and
+/// lets none through that is not one of the nets in view.
+pub(crate) const PROBABILITY_THRESHOLD: f64 = 0.7;
 /// A followed junction is the nearest one within this part of a cell of where the motion puts it.
 const SNAP_CELLS: f64 = 0.35;
 

@@ -38,7 +38,7 @@ fn stages(c: &mut Criterion) {
     let bins = Bins::Half { left: 8, right: 92, vertical: 97 };
     let mut drawn = SpectrumImage::default();
     group.bench_function("grey image", |b| b.iter(|| drawn.draw(&half, bins, SpectrumImageConfig::default())));
-    let (mut flattener, mut flat) = (Flattener::new(width, height, bins).unwrap(), Image::default());
+    let (mut flattener, mut flat) = (Flattener::new(width, height, bins, 1e4).unwrap(), Image::default());
     group.bench_function("flatten", |b| b.iter(|| flattener.flatten(&half, &mut flat).unwrap()));
     let (mut extrema, mut out) = (RunningExtrema::default(), Image::default());
     for size in [3, 16, 64] {

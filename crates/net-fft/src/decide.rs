@@ -30,26 +30,6 @@ pub(crate) fn sections_seeing(field: &LatticeField, sections: &[Section]) -> f64
     if able > 0.0 { seeing / able } else { 0.0 }
 }
 
-/// How much higher the spectrum stands at sums and differences of the two wave vectors than at the weaker of them, nats, in the mean over sections; or, if that is more, twice
-/// what it has at half of these. Two families of thin twines add up, so that a net has little at the sums and nothing at the halves; scales and hexagons, whose lattice
-/// fits as well, have as much there as anywhere, and bricks, with another one in the middle of each cell, have it at the halves.
-pub(crate) fn mixed_orders(field: &LatticeField, sections: &[Section]) -> f64 {
-    let mean = |part: f64, weight: f32| {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for section in sections {
-            let Some([first, second]) = section.bins_of(field) else { continue };
-            let bins = [first, second, (first + second) * part, (first - second) * part];
-            if let [Some(a), Some(b), Some(c), Some(d)] = bins.map(|bin| section.rise(bin, Reading::Here)) {
-                // One of the two is enough: in a wall seen askew the other may be weak.
-                sum += f64::from(weight * c.max(d) - a.min(b));
-                count += 1.0;
-            }
-        }
-        sum / f64::max(count, 1.0)
-    };
-    mean(1.0, 1.0).max(mean(0.5, 2.0))
-}
-
 /// Probability that what has such support is a net with the right pose: logistic, its weights fitted to the simulator's random scenes and rounded (`examples/study.rs`).
 pub(crate) fn probability(support: &Support) -> f64 {
     let mean = |family: usize| support.evidence.families[family] / f64::from(support.evidence.terms[family].max(1));

@@ -9,11 +9,11 @@ use std::f64::consts::{PI, TAU};
 use net_geometry::nalgebra::Vector2;
 use rustfft::num_complex::Complex64;
 
+use crate::bins::log_magnitude;
 use crate::evidence::{NEAREST_BINS, Reading, Section};
 use crate::field::LatticeField;
 use crate::fit::{NormalEquations, Parameters, ParametersSquared};
 use crate::sections::GRID;
-use crate::spectrum::log_magnitude;
 
 const POINTS: usize = GRID.len() * GRID.len();
 /// Way from one point of the grid to the next, sections.
@@ -86,12 +86,7 @@ impl Envelopes {
                     if at.norm() < NEAREST_BINS || section.ellipse.fraction(at) >= 1.0 {
                         continue;
                     }
-                    let wanted = PEAK_BINS + 1.3 * spread[family] * harmonic as f64;
-                    let radius = wanted.min(half_way).min(LARGEST_PATCH_BINS);
-                    // A smear as wide as the way to the next one cannot be told from it.
-                    if radius < 1.2 || wanted > 2.0 * radius {
-                        continue;
-                    }
+                    let Some(radius) = patch_radius(spread[family] * harmonic as f64, half_way) else { continue };
                     let amplitudes = cut_out(section, at, radius);
                     // The patch's weights, squared, sum to 0.3 of its circle's square, and the window lets 3/8 of the power through along each side.
                     let noise = background(section, at) * (0.4 * PI).sqrt() * radius;
@@ -162,6 +157,18 @@ impl Envelopes {
         (agreement.measurements >= 8).then_some(agreement)
     }
 
+    /// Mean amplitude of a family's fundamental in a section, the field's phase taken off. `None` if it was not cut out there.
+    pub(crate) fn fundamental(
+        &self,
+        index: usize,
+        family: usize,
+        field: &LatticeField,
+        section: &Section,
+    ) -> Option<Complex64> {
+        let wave = self.waves.iter().find(|w| (w.section, w.family, w.harmonic) == (index, family, 1))?;
+        Some(wave.demodulated(field, section).iter().sum::<Complex64>() / POINTS as f64)
+    }
+
     /// How well the second harmonic's phase follows from the first's, per family: thin twine puts both in step (light on dark) or out of step (dark on light), and nothing else does. The sum
     /// of the cosines over sections times `sqrt(2 / n)`, and n: about standard normal without a net. The fit has no hand in it.
     pub(crate) fn second_harmonic(&self, field: &LatticeField, sections: &[Section]) -> [(f64, u32); 2] {
@@ -221,8 +228,15 @@ impl Agreement {
     }
 }
 
+/// Half width of the patch that holds a wave whose vector wanders by `spread` bins, no wider than `half_way` to the next one. `None` where it cannot be told from that.
+pub(crate) fn patch_radius(spread: f64, half_way: f64) -> Option<f64> {
+    let wanted = PEAK_BINS + 1.3 * spread;
+    let radius = wanted.min(half_way).min(LARGEST_PATCH_BINS);
+    (radius >= 1.2 && wanted <= 2.0 * radius).then_some(radius)
+}
+
 /// Transforms the bins within `radius` of `at` back to the points of the grid.
-fn cut_out(section: &Section, at: Vector2<f64>, radius: f64) -> [Complex64; POINTS] {
+pub(crate) fn cut_out(section: &Section, at: Vector2<f64>, radius: f64) -> [Complex64; POINTS] {
     let spectrum = section.spectrum.transform();
     let (width, height) = (spectrum.width() as f64, spectrum.height() as f64);
     let range = |centre: f64| (centre - radius).ceil() as isize..=(centre + radius).floor() as isize;
@@ -258,15 +272,17 @@ fn cut_out(section: &Section, at: Vector2<f64>, radius: f64) -> [Complex64; POIN
 fn background(section: &Section, at: Vector2<f64>) -> f64 {
     let rise = section.rise(at, Reading::Here).unwrap_or(0.0);
     let (kx, ky) = (at.x.round() as isize, at.y.round() as isize);
+    let least = section.spectrum.least_magnitude;
+    let per_power = (1.0 / (least * least)) as f32;
     let mut sum = 0.0;
     // Blurred as the flattened spectrum is.
     for (dv, weight_v) in [(-1, 0.25), (0, 0.5), (1, 0.25)] {
         for (du, weight_u) in [(-1, 0.25), (0, 0.5), (1, 0.25)] {
             let bin = section.spectrum.transform().bin(kx + du, ky + dv);
-            sum += weight_u * weight_v * log_magnitude(bin.norm_sqr());
+            sum += weight_u * weight_v * log_magnitude(bin.norm_sqr() * per_power);
         }
     }
-    f64::from(sum - rise).exp()
+    f64::from(sum - rise).exp() * least
 }
 
 /// Calls `with` for every pair of grid points next to one another along the axis (0: u, 1: v).

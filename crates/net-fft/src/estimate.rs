@@ -64,7 +64,7 @@ pub struct Support {
     pub second_harmonic: [f64; 2],
     /// Root mean square of what the fit leaves of the wave vectors, bins.
     pub residual_bins: f64,
-    /// How much higher the spectrum stands at sums and differences of the wave vectors than at themselves, or twice what it has at half of these, nats: well below 0 of a net.
+    /// How much more there is at sums and differences of the wave vectors than at themselves, or twice what there is at half of these, nats: well below 0 of a net.
     pub mixed_orders_nats: f64,
     /// How far the crossing angle is from the mesh's, standard deviations of [`crate::ShapeConfig`].
     pub angle_sigmas: f64,

@@ -3,9 +3,9 @@
 use net_geometry::nalgebra::Vector2;
 use net_image::{BoxFilter, Image};
 
+use crate::bins::{Bins, log_magnitude, map_column};
 use crate::error::Result;
 use crate::fft2::HalfSpectrum;
-use crate::spectrum::{Bins, log_magnitude, map_column};
 
 /// Half side of the square over which the background is averaged, bins: wider than a peak (4), narrower than shading's slope.
 const BACKGROUND_RADIUS_BINS: usize = 6;
@@ -26,13 +26,15 @@ pub struct Flattener {
     ranges: [isize; 4],
     /// Size of the transformed pictures, px.
     size: (usize, usize),
+    /// One over the power of the least noise.
+    per_noise_power: f32,
     box_mean: BoxFilter<u8>,
     /// Ring of every bin, column by column of the spectrum; the core's is [`CORE_RING`].
     rings: Vec<u16>,
     sums: Vec<(i32, i32)>,
-    /// Mean of every ring, 1/512 nat.
+    /// Mean of every ring, 1/384 nat.
     profile: Vec<i16>,
-    /// Logarithms, column by column: 1/32 nat, then blurred, 1/512 nat.
+    /// Logarithms, column by column: 1/24 nat, then blurred, 1/384 nat.
     logarithms: Vec<i16>,
     blurred: Vec<i16>,
     residual: Vec<u8>,
@@ -44,13 +46,22 @@ impl Flattener {
     /// Level of the background in a flattened image.
     pub const ZERO: u8 = 64;
     /// Levels for a factor of e in magnitude.
-    pub const LEVELS_PER_NAT: f32 = 32.0;
+    pub const LEVELS_PER_NAT: f32 = 24.0;
 
-    /// For the `bins` of spectra of pictures of `width` x `height` px.
+    /// For the `bins` of spectra of pictures of `width` x `height` px, with at least `noise_power` of noise in every bin ([`crate::SpectrumPlan::noise_power`]): in a spectrum of less, no
+    /// background is lower than this, and no peak reaches higher above it.
     ///
     /// # Errors
-    /// [`crate::Error::EmptySize`] if either is zero.
-    pub fn new(width: usize, height: usize, bins: Bins) -> Result<Self> {
+    /// [`crate::Error::EmptySize`] if either is zero, [`crate::Error::Parameter`] for a power that is not above zero.
+    pub fn new(width: usize, height: usize, bins: Bins, noise_power: f64) -> Result<Self> {
+        let per_noise_power = (1.0 / noise_power) as f32;
+        if !(per_noise_power > 0.0 && per_noise_power.is_finite()) {
+            return Err(crate::Error::Parameter {
+                field: "noise_power",
+                value: noise_power,
+                expected: "a finite number above 0",
+            });
+        }
         if width == 0 || height == 0 {
             return Err(crate::Error::EmptySize { width, height });
         }
@@ -69,6 +80,7 @@ impl Flattener {
         Ok(Self {
             ranges,
             size: (width, height),
+            per_noise_power,
             box_mean: BoxFilter::new(BACKGROUND_RADIUS_BINS)?,
             rings,
             sums: vec![(0, 0); count],
@@ -104,7 +116,7 @@ impl Flattener {
             map_column(spectrum, kx, y0, to, |bins, to| {
                 for (to, bin) in to.iter_mut().zip(bins) {
                     // At most 45 nats of a float's square root.
-                    *to = (log_magnitude(bin.norm_sqr()) * Self::LEVELS_PER_NAT + 0.5) as i16;
+                    *to = (log_magnitude(bin.norm_sqr() * self.per_noise_power) * Self::LEVELS_PER_NAT + 0.5) as i16;
                 }
             });
         }
@@ -217,7 +229,7 @@ mod tests {
         let (mut spectrum, mut out) = (HalfSpectrum::default(), Image::default());
         plan.transform(View::packed(&data, width, height).unwrap(), &mut spectrum).unwrap();
         let bins = Bins::Half { left: 8, right: 60, vertical: 50 };
-        let mut flattener = Flattener::new(width, height, bins).unwrap();
+        let mut flattener = Flattener::new(width, height, bins, 1.0).unwrap();
         flattener.flatten(&spectrum, &mut out).unwrap();
         (out, flattener.constant_bin())
     }
@@ -249,8 +261,9 @@ mod tests {
             assert_eq!((out.width(), out.height()), (width, height));
             assert_eq!((cx, cy), (width / 2, height / 2));
         }
-        let mut flattener = Flattener::new(8, 8, Bins::All).unwrap();
+        let mut flattener = Flattener::new(8, 8, Bins::All, 1.0).unwrap();
         assert!(flattener.flatten(&HalfSpectrum::default(), &mut Image::default()).is_err());
-        assert!(Flattener::new(0, 8, Bins::All).is_err());
+        assert!(Flattener::new(0, 8, Bins::All, 1.0).is_err());
+        assert!(Flattener::new(8, 8, Bins::All, 0.0).is_err());
     }
 }

@@ -49,9 +49,11 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod bins;
 mod cell;
 mod choose;
 mod config;
+mod crossings;
 mod decide;
 mod envelope;
 mod error;
@@ -76,7 +78,9 @@ mod search;
 mod section;
 mod sections;
 mod spectrum;
+mod spectrum_image;
 
+pub use bins::Bins;
 pub use cell::cell_poses;
 pub use choose::{Choice, Confidence, choose};
 pub use config::{PlaneSource, Selection, ThesisConfig};
@@ -97,4 +101,5 @@ pub use score::{Candidate, ScoreConfig, score_peaks};
 pub use search::{Hypothesis, SearchConfig};
 pub use section::{SectionAnalyser, SectionConfig, SectionSpectrum};
 pub use sections::{GRID, GridConfig, SectionView};
-pub use spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};
+pub use spectrum::{SpectrumPlan, Window};
+pub use spectrum_image::{SpectrumImage, SpectrumImageConfig};

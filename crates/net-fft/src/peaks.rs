@@ -25,7 +25,7 @@ pub struct PeakConfig {
 
 impl Default for PeakConfig {
     fn default() -> Self {
-        Self { neighbourhood_bins: 5, threshold_levels: 20, lowest_level: 92, cluster_bins: 2.5 }
+        Self { neighbourhood_bins: 5, threshold_levels: 15, lowest_level: 86, cluster_bins: 2.5 }
     }
 }
 

@@ -45,69 +45,59 @@ impl Fitted {
     }
 }
 
-/// Fits the field to the waves of all sections: once where they agree on it, else from other tilts too, for a fit holds on to a wrong one. Leaves the waves of the
-/// returned field in `envelopes`.
-pub(crate) fn polish(
-    field: &LatticeField,
-    envelopes: &mut Envelopes,
-    sections: &[Section],
-    mesh: &Mesh,
-    config: &ThesisConfig,
-) -> Option<Fitted> {
-    let mut best = fit_shape(field, envelopes, sections, mesh, config)?;
-    let steepest = config.search.max_tilt_deg.to_radians().cos();
-    if best.agreement.residual_bins > DOUBTFUL_BINS {
-        for factor in OTHER_TILTS {
-            let Some(start) = tilted(field, factor) else { continue };
-            let Some(other) = fit_shape(&start, envelopes, sections, mesh, config) else { continue };
-            if other.field.normal.z > steepest && other.agreement.is_clearly_better_than(&best.agreement) {
-                best = other;
+/// What a lattice is fitted to.
+pub(crate) struct Polish<'a> {
+    pub(crate) sections: &'a [Section],
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) config: &'a ThesisConfig,
+}
+
+impl Polish<'_> {
+    /// Fits the field to the waves of all sections: once where they agree on it, else from other tilts too, for a fit holds on to a wrong one. Leaves the waves of the
+    /// returned field in `envelopes`.
+    pub(crate) fn run(&self, field: &LatticeField, envelopes: &mut Envelopes) -> Option<Fitted> {
+        let mut best = self.fit_shape(field, envelopes)?;
+        let steepest = self.config.search.max_tilt_deg.to_radians().cos();
+        if best.agreement.residual_bins > DOUBTFUL_BINS {
+            for factor in OTHER_TILTS {
+                let Some(start) = tilted(field, factor) else { continue };
+                let Some(other) = self.fit_shape(&start, envelopes) else { continue };
+                if other.field.normal.z > steepest && other.agreement.is_clearly_better_than(&best.agreement) {
+                    best = other;
+                }
             }
         }
+        envelopes.extract(&best.field, self.sections);
+        Some(best)
     }
-    envelopes.extract(&best.field, sections);
-    Some(best)
-}
 
-/// Flat, then bent; keeps the bend if the waves ask for it.
-fn fit_shape(
-    field: &LatticeField,
-    envelopes: &mut Envelopes,
-    sections: &[Section],
-    mesh: &Mesh,
-    config: &ThesisConfig,
-) -> Option<Fitted> {
-    let flat = fit_waves(field, FLAT, envelopes, sections, mesh, config)?;
-    if config.shape.sigma_curvature_per_m == 0.0 {
-        return Some(flat);
+    /// Flat, then bent; keeps the bend if the waves ask for it.
+    fn fit_shape(&self, field: &LatticeField, envelopes: &mut Envelopes) -> Option<Fitted> {
+        let flat = self.fit_waves(field, FLAT, envelopes)?;
+        if self.config.shape.sigma_curvature_per_m == 0.0 {
+            return Some(flat);
+        }
+        let Some(bent) = self.fit_waves(&flat.field, BENT, envelopes) else { return Some(flat) };
+        // Bayesian information criterion: three numbers more must earn their keep. (Misfits are twice a logarithm of likelihood.)
+        let price = 3.0 * f64::from(flat.agreement.measurements).ln();
+        Some(if bent.agreement.gain_over(&flat.agreement) > price { bent } else { flat })
     }
-    let Some(bent) = fit_waves(&flat.field, BENT, envelopes, sections, mesh, config) else { return Some(flat) };
-    // Bayesian information criterion: three numbers more must earn their keep. (Misfits are twice a logarithm of likelihood.)
-    let price = 3.0 * f64::from(flat.agreement.measurements).ln();
-    Some(if bent.agreement.gain_over(&flat.agreement) > price { bent } else { flat })
-}
 
-fn fit_waves(
-    field: &LatticeField,
-    fitted: usize,
-    envelopes: &mut Envelopes,
-    sections: &[Section],
-    mesh: &Mesh,
-    config: &ThesisConfig,
-) -> Option<Fitted> {
-    let mut field = *field;
-    for (pass, tolerance) in TOLERANCES_BINS.into_iter().enumerate() {
-        envelopes.extract(&field, sections);
-        let mut equations = NormalEquations::about(&field, fitted);
-        let agreement = envelopes.measure(&mut equations, sections, tolerance)?;
-        equations.add_shape(mesh, &config.shape);
-        if fitted == BENT {
-            equations.add_bend(mesh, &config.shape);
+    fn fit_waves(&self, field: &LatticeField, fitted: usize, envelopes: &mut Envelopes) -> Option<Fitted> {
+        let mut field = *field;
+        for (pass, tolerance) in TOLERANCES_BINS.into_iter().enumerate() {
+            envelopes.extract(&field, self.sections);
+            let mut equations = NormalEquations::about(&field, fitted);
+            let agreement = envelopes.measure(&mut equations, self.sections, tolerance)?;
+            equations.add_shape(self.mesh, &self.config.shape);
+            if fitted == BENT {
+                equations.add_bend(self.mesh, &self.config.shape);
+            }
+            if pass + 1 == TOLERANCES_BINS.len() {
+                return Some(Fitted { field, agreement, information: equations.matrix });
+            }
+            field = equations.solve(0.3)?;
         }
-        if pass + 1 == TOLERANCES_BINS.len() {
-            return Some(Fitted { field, agreement, information: equations.matrix });
-        }
-        field = equations.solve(0.3)?;
+        None
     }
-    None
 }

@@ -106,7 +106,8 @@ pub(crate) struct Search {
     pairs: Vec<Pair>,
     planes: Vec<(f64, usize, LatticeField)>,
     found: Vec<Hypothesis>,
-    /// Lattices fitted in the last run.
+    /// Planes looked at, and lattices fitted, in the last run.
+    tried: usize,
     fits: usize,
 }
 
@@ -134,7 +135,7 @@ impl Search {
         }
     }
 
-    /// All lattices that were fitted, best first.
+    /// Lattices that were fitted, best first: until one stands out everywhere.
     pub(crate) fn run(
         &mut self,
         sections: &[Section],
@@ -145,12 +146,35 @@ impl Search {
         self.collect_pairs(sections, config);
         self.try_planes(sections, mesh);
         self.found.clear();
-        self.fits = 0;
-        for index in 0..self.planes.len() {
-            if self.fits >= config.fits {
-                break;
-            }
-            let (_, pair, field) = self.planes[index];
+        (self.fits, self.tried) = (0, 0);
+        self.fit_planes(sections, mesh, shape, config, true);
+        self.settle_period(sections, mesh, shape);
+        &self.found
+    }
+
+    /// Where the first of [`Self::run`] turned out to be wrong: all that were not fitted before, best of all first.
+    pub(crate) fn go_on(
+        &mut self,
+        sections: &[Section],
+        mesh: &Mesh,
+        shape: &ShapeConfig,
+        config: &SearchConfig,
+    ) -> &[Hypothesis] {
+        self.fit_planes(sections, mesh, shape, config, false);
+        &self.found
+    }
+
+    fn fit_planes(
+        &mut self,
+        sections: &[Section],
+        mesh: &Mesh,
+        shape: &ShapeConfig,
+        config: &SearchConfig,
+        until_decisive: bool,
+    ) {
+        while self.tried < self.planes.len() && self.fits < config.fits {
+            let (_, pair, field) = self.planes[self.tried];
+            self.tried += 1;
             let ray = sections[self.pairs[pair].section].view.ray;
             if self.found.iter().any(|known| same_waves(&known.field, &field, ray)) {
                 continue;
@@ -160,14 +184,12 @@ impl Search {
             let ratio_off = shape_misfit(&hypothesis.field, mesh, CLEAR_RATIO, f64::INFINITY);
             let decisive = is_decisive(&hypothesis.evidence) && ratio_off < 1.0;
             self.found.push(hypothesis);
-            if decisive {
+            if decisive && until_decisive {
                 break;
             }
         }
         // A handful, and stable on so few without a buffer.
         self.found.sort_by(|a, b| b.total.total_cmp(&a.total));
-        self.settle_period(sections, mesh, shape);
-        &self.found
     }
 
     /// What the last run found.

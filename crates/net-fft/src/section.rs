@@ -3,19 +3,21 @@
 use net_geometry::nalgebra::Vector2;
 use net_image::{Image, View};
 
-use crate::error::Result;
+use crate::bins::Bins;
+use crate::error::{Error, Result};
 use crate::fft2::HalfSpectrum;
 use crate::filter::{Ellipse, FallingThreshold, FilterConfig, filter_peaks};
 use crate::flatten::Flattener;
 use crate::peaks::{Peak, PeakConfig, PeakFinder, peaks_at_most};
 use crate::score::{Candidate, ScoreConfig, score_peaks};
-use crate::spectrum::{Bins, SpectrumImage, SpectrumImageConfig, SpectrumPlan, Window};
+use crate::spectrum::{SpectrumPlan, Window};
+use crate::spectrum_image::{SpectrumImage, SpectrumImageConfig};
 
 /// Bins beyond the ellipse that the filters see, so that peaks at its edge are found.
 const PADDING_BINS: usize = 8;
 
 /// From a picture to candidates.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SectionConfig {
     /// What multiplies the picture. Default Hann.
@@ -24,12 +26,29 @@ pub struct SectionConfig {
     pub image: SpectrumImageConfig,
     /// Leaves the background of the spectrum in, as the thesis does. Default false: peaks are looked for in the flattened spectrum ([`Flattener`]).
     pub keep_background: bool,
+    /// Least noise of a pixel that is reckoned with, grey levels (of whatever the samples hold). Default 1: less than that of any camera, more than the rounding of 8-bit pictures (0.29). In a drawn picture without noise
+    /// nothing else would hide what is a thousand times weaker than the net's waves, and everything in it would look like one. Larger: faint nets are lost.
+    pub least_noise_grey: f64,
     /// What counts as a peak.
     pub peaks: PeakConfig,
     /// Which peaks pass.
     pub filter: FilterConfig,
     /// Which are the lattice's own.
     pub score: ScoreConfig,
+}
+
+impl Default for SectionConfig {
+    fn default() -> Self {
+        Self {
+            window: Window::default(),
+            image: SpectrumImageConfig::default(),
+            keep_background: false,
+            least_noise_grey: 1.0,
+            peaks: PeakConfig::default(),
+            filter: FilterConfig::default(),
+            score: ScoreConfig::default(),
+        }
+    }
 }
 
 impl SectionConfig {
@@ -60,6 +79,10 @@ impl SectionConfig {
     /// # Errors
     /// [`crate::Error::Parameter`] names the field.
     pub fn validate(&self) -> Result<()> {
+        let value = self.least_noise_grey;
+        if !(value > 1e-3 && value < 1e6) {
+            return Err(Error::Parameter { field: "least_noise_grey", value, expected: "between 0.001 and a million" });
+        }
         self.peaks.validate()?;
         self.filter.validate()?;
         self.score.validate()
@@ -76,6 +99,8 @@ pub struct SectionSpectrum {
     pub(crate) all_peaks: Vec<Peak>,
     pub(crate) peaks: Vec<Peak>,
     pub(crate) candidates: Vec<Candidate>,
+    /// Magnitude that the flattened spectrum's logarithms count from.
+    pub(crate) least_magnitude: f64,
 }
 
 impl SectionSpectrum {
@@ -111,6 +136,8 @@ impl SectionSpectrum {
 pub struct SectionAnalyser {
     config: SectionConfig,
     plan: SpectrumPlan,
+    /// Magnitude of a bin of the least noise.
+    least_magnitude: f64,
     ellipse: Ellipse,
     bins: Bins,
     image: SpectrumImage,
@@ -133,13 +160,16 @@ impl SectionAnalyser {
             right: ellipse.horizontal_bins as usize + PADDING_BINS,
             vertical: ellipse.vertical_bins as usize + PADDING_BINS,
         };
+        let plan = SpectrumPlan::new(width, height, config.window)?;
+        let noise_power = plan.noise_power(config.least_noise_grey);
         Ok(Self {
             config: *config,
-            plan: SpectrumPlan::new(width, height, config.window)?,
+            plan,
+            least_magnitude: noise_power.sqrt(),
             ellipse,
             bins,
             image: SpectrumImage::default(),
-            flattener: Flattener::new(width, height, bins)?,
+            flattener: Flattener::new(width, height, bins, noise_power)?,
             finder: PeakFinder::default(),
             order: Vec::new(),
         })
@@ -157,6 +187,7 @@ impl SectionAnalyser {
     pub fn analyse<T: Copy + Into<f32>>(&mut self, picture: View<'_, T>, out: &mut SectionSpectrum) -> Result<()> {
         let config = &self.config;
         self.plan.transform(picture, &mut out.half)?;
+        out.least_magnitude = self.least_magnitude;
         let (mean, threshold) = if config.keep_background {
             self.image.draw(&out.half, self.bins, config.image);
             out.constant_bin = self.image.constant_bin();
