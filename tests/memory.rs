@@ -1,4 +1,4 @@
-//! A tracker that follows a net by the thesis's method allocates nothing after its first frames.
+//! A tracker that follows a net allocates nothing after its first frames, by either method.
 
 #![allow(clippy::unwrap_used)]
 
@@ -36,4 +36,9 @@ fn allocations_per_frame(method: Method) -> Vec<u64> {
 #[test]
 fn the_thesis_method_allocates_nothing() {
     assert_eq!(allocations_per_frame(Method::Thesis), [0; FRAMES - WARM_UP]);
+}
+
+#[test]
+fn the_lattice_method_allocates_nothing() {
+    assert_eq!(allocations_per_frame(Method::Lattice), [0; FRAMES - WARM_UP]);
 }

@@ -220,7 +220,7 @@ impl Workspace {
 
     /// One family can sit half a cell off when the other decided the polarity: the drawing tells.
     fn seat_families(&mut self, best: &mut Lock, level: usize, widest: f64) {
-        self.high(level, self.view.high_pass_px(widest));
+        self.high(level, widest);
         let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
         drawing.sparse = true;
         let mut top = (f64::NEG_INFINITY, best.surface);

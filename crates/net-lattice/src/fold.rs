@@ -73,7 +73,7 @@ impl Folder {
                 let half = coin(x, y);
                 let sums = &mut self.sums[half * WIDE * WIDE..][..WIDE * WIDE];
                 for r in 0..BLOCK {
-                    let row = &level.high.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
+                    let row = &level.thin.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
                     let v = r as f32 - 1.5;
                     for (c, i) in row.iter().enumerate() {
                         let u = c as f32 - 1.5;

@@ -51,7 +51,7 @@ impl Workspace {
         let least = self.scope.sides.map(|s| 0.5 * (self.twine / s) as f32);
         let painted = lines.paint_over(&self.tools.map, level, least, first.blur, &mut self.tools.smoother)?;
         self.view.average_down();
-        self.tools.high = [(0.0, 0.0); 4];
+        self.tools.forget();
         let mut second = self.cold(config)?;
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let shown = self.shown(&second, &painted);

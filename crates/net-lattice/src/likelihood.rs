@@ -5,7 +5,7 @@ use net_image::Image;
 
 use crate::fit::Observation;
 use crate::map::PhaseMap;
-use crate::numeric::{log2_rough, magnitude_quantile, median, wrap};
+use crate::numeric::{log2_rough, magnitude_quantiles, median, wrap};
 use crate::smooth::Smoother;
 use crate::surface::Surface;
 use crate::template::{Profile, look_up};
@@ -99,8 +99,7 @@ impl Likelihood {
         }
         let every = level.high.data().iter().copied();
         // Most of a picture may be empty: not less than a few per cent of what stands out in it.
-        let contrast = magnitude_quantile(every.clone(), 0.97, &mut self.histogram);
-        let middle = magnitude_quantile(every, 0.5, &mut self.histogram);
+        let [middle, contrast] = magnitude_quantiles(every, [0.5, 0.97], &mut self.histogram);
         self.noise = (1.4826 * middle).max(0.04 * contrast).max(1e-6);
     }
 

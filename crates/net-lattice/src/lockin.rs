@@ -87,7 +87,7 @@ pub(crate) fn demodulate<const SECOND: bool>(
     sums.resize(grid.nx * grid.ny, TileSum::default());
     let (bx, by) = level.blocks();
     for y in 0..by {
-        let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.high.row(y * BLOCK + r));
+        let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.thin.row(y * BLOCK + r));
         let first = usize::from(grid.row[y]) * grid.nx;
         let sites = &grid.sites[first..][..grid.nx];
         let tiles = &mut sums[first..][..grid.nx];

@@ -51,8 +51,12 @@ pub(crate) fn erf(x: f64) -> f64 {
     if x < 0.0 { -r } else { r }
 }
 
-/// The `q` quantile of the magnitudes of `values`, from a histogram of 4096 bins up to their maximum. Zero for none.
-pub(crate) fn magnitude_quantile(values: impl Iterator<Item = f32> + Clone, q: f64, histogram: &mut Vec<u32>) -> f32 {
+/// Quantiles of the magnitudes, by a histogram over their range; `q` ascending.
+pub(crate) fn magnitude_quantiles<const N: usize>(
+    values: impl Iterator<Item = f32> + Clone,
+    q: [f64; N],
+    histogram: &mut Vec<u32>,
+) -> [f32; N] {
     const BINS: usize = 4096;
     let (mut max, mut count) = (0.0f32, 0u64);
     for v in values.clone() {
@@ -60,7 +64,7 @@ pub(crate) fn magnitude_quantile(values: impl Iterator<Item = f32> + Clone, q: f
         count += 1;
     }
     if count == 0 || max <= 0.0 {
-        return 0.0;
+        return [0.0; N];
     }
     histogram.clear();
     histogram.resize(BINS, 0);
@@ -68,23 +72,23 @@ pub(crate) fn magnitude_quantile(values: impl Iterator<Item = f32> + Clone, q: f
     for v in values {
         histogram[((v.abs() * per) as usize).min(BINS - 1)] += 1;
     }
-    let target = (q * count as f64) as u64;
-    let mut sum = 0u64;
+    let mut out = [max; N];
+    let (mut sum, mut next) = (0u64, 0);
     for (k, n) in histogram.iter().enumerate() {
         sum += u64::from(*n);
-        if sum > target {
-            return (k as f32 + 0.5) / per;
+        while next < N && sum > (q[next] * count as f64) as u64 {
+            out[next] = (k as f32 + 0.5) / per;
+            next += 1;
         }
     }
-    max
+    out
 }
 
 /// Magnitude at which a high-passed picture is clipped. Twine is a few standard deviations of what is around it; fish and tags are tens, and
 /// would drown it in every sum. Without noise everything beside the twine is zero, so never less than a tenth of what stands out.
 pub(crate) fn clip_level(values: impl Iterator<Item = f32> + Clone, histogram: &mut Vec<u32>) -> f32 {
     const SIGMAS: f32 = 4.0;
-    let middle = magnitude_quantile(values.clone(), 0.5, histogram);
-    let high = magnitude_quantile(values, 0.97, histogram);
+    let [middle, high] = magnitude_quantiles(values, [0.5, 0.97], histogram);
     (SIGMAS * 1.4826 * middle).clamp(0.1 * high, high)
 }
 

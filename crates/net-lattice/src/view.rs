@@ -61,8 +61,9 @@ pub(crate) struct Level {
     pub scale: f64,
     /// Brightness, 0 to 1, rows and columns cut to whole blocks.
     pub raw: Image<f32>,
-    /// The same without what is smooth, filled by whoever needs it.
+    /// The same without what is smooth, filled by whoever needs it: for drawing, and for the lock-in.
     pub high: Image<f32>,
+    pub thin: Image<f32>,
     /// Corners of blocks.
     pub nodes_x: usize,
     pub nodes_y: usize,
@@ -73,6 +74,16 @@ pub(crate) struct Level {
 }
 
 impl Level {
+    /// Fills `high`: brightness less what is smooth over `sigma` full-resolution px.
+    pub(crate) fn filter_high(&mut self, sigma: f64, smoother: &mut Smoother) {
+        smoother.subtract_blur(&self.raw, (sigma / self.scale) as f32, &mut self.high);
+    }
+
+    /// Fills `thin` in the same way.
+    pub(crate) fn filter_thin(&mut self, sigma: f64, smoother: &mut Smoother) {
+        smoother.subtract_blur(&self.raw, (sigma / self.scale) as f32, &mut self.thin);
+    }
+
     pub(crate) fn blocks(&self) -> (usize, usize) {
         (self.nodes_x - 1, self.nodes_y - 1)
     }
@@ -149,6 +160,7 @@ impl View {
                 scale,
                 raw: Image::new(lw, lh),
                 high: Image::new(lw, lh),
+                thin: Image::new(lw, lh),
                 nodes_x: bx + 1,
                 nodes_y: by + 1,
                 rays,
@@ -214,17 +226,16 @@ impl View {
     /// Length scale, full-resolution px, of the high-pass filter of the lock-in: shorter than the other, so that of a fish only its outline
     /// is left, and still longer than what twine is wide.
     pub(crate) fn thin_px(&self, cell: f64) -> f64 {
-        (0.3 * cell).max(4.0 * self.size.max(self.reduction as f64))
+        stepped((0.3 * cell).max(4.0 * self.size.max(self.reduction as f64)))
     }
 
     /// Length scale, full-resolution px, of the high-pass filter of the drawing's comparison for a cell of that many px.
     pub(crate) fn high_pass_px(&self, cell: f64) -> f64 {
-        (0.9 * cell).max(8.0 * self.size.max(self.reduction as f64))
+        stepped((0.9 * cell).max(8.0 * self.size.max(self.reduction as f64)))
     }
+}
 
-    /// Fills `high` of a level: brightness minus its smooth part.
-    pub(crate) fn high_pass(&mut self, level: usize, sigma_px: f64, smoother: &mut Smoother) {
-        let level = &mut self.levels[level];
-        smoother.subtract_blur(&level.raw, (sigma_px / level.scale) as f32, &mut level.high);
-    }
+/// The next quarter of an octave: cells that are nearly alike share a filtered picture.
+fn stepped(px: f64) -> f64 {
+    (0.25 * (4.0 * px.log2()).round()).exp2()
 }

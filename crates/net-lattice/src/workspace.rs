@@ -71,8 +71,18 @@ pub(crate) struct Tools {
     pub scores: Vec<(usize, Params)>,
     pub folder: Folder,
     pub unwrapper: Unwrapper,
-    /// What `high` of each level holds: filter length, and the gain of the lock-in.
-    pub high: [(f64, f32); 4],
+    /// Length of the filter of each level's `high`; zero for none yet.
+    pub high: [f64; 4],
+    /// The same of `thin`, and the gain of the lock-in.
+    pub thin: [(f64, f32); 4],
+}
+
+impl Tools {
+    /// Another picture: nothing is filtered yet.
+    pub(crate) fn forget(&mut self) {
+        self.high = [0.0; 4];
+        self.thin = [(0.0, 0.0); 4];
+    }
 }
 
 /// A locked candidate.
@@ -131,7 +141,7 @@ impl Workspace {
     pub(crate) fn load(&mut self, image: GrayView<'_>) {
         self.view.load(image);
         self.stages = None;
-        self.tools.high = [(0.0, 0.0); 4];
+        self.tools.forget();
     }
 
     /// Full-resolution px of a cell (geometric mean of the sides) on the axis.
@@ -144,16 +154,25 @@ impl Workspace {
         self.view.focal * self.scope.sides[0].min(self.scope.sides[1]) / depth
     }
 
-    /// Makes sure that `high` of a level is what is finer than `sigma` full-resolution px; returns the lock-in's gain.
-    pub(crate) fn high(&mut self, level: usize, sigma: f64) -> f32 {
-        let t = &mut self.tools;
-        if (t.high[level].0 / sigma - 1.0).abs() > 0.02 {
-            self.view.high_pass(level, sigma, &mut t.smoother);
-            let high = self.view.levels[level].high.data();
-            let q = clip_level(high.iter().copied(), &mut t.histogram);
-            t.high[level] = (sigma, 1.0 / (q + 1e-9));
+    /// Makes sure that `high` of a level is filtered for drawing cells of `cell` px.
+    pub(crate) fn high(&mut self, level: usize, cell: f64) {
+        let sigma = self.view.high_pass_px(cell);
+        if self.tools.high[level] != sigma {
+            self.tools.high[level] = sigma;
+            self.view.levels[level].filter_high(sigma, &mut self.tools.smoother);
         }
-        t.high[level].1
+    }
+
+    /// Makes sure that `thin` of a level is filtered for locking to cells of `cell` px; returns the lock-in's gain.
+    pub(crate) fn thin(&mut self, level: usize, cell: f64) -> f32 {
+        let sigma = self.view.thin_px(cell);
+        let t = &mut self.tools;
+        if t.thin[level].0 != sigma {
+            self.view.levels[level].filter_thin(sigma, &mut t.smoother);
+            let q = clip_level(self.view.levels[level].thin.data().iter().copied(), &mut t.histogram);
+            t.thin[level] = (sigma, 1.0 / (q + 1e-9));
+        }
+        t.thin[level].1
     }
 
     /// Level and tiling of the lock-in for a depth.
@@ -169,7 +188,7 @@ impl Workspace {
         sign: f64,
         window: &Window,
     ) {
-        let gain = self.high(place.0, self.view.thin_px(self.cell_px(surface.depth)));
+        let gain = self.thin(place.0, self.cell_px(surface.depth));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
@@ -185,7 +204,7 @@ impl Workspace {
 
     /// All cells on top of each other, where the last measurements found the lattice; those of `place` and this surface.
     pub(crate) fn fold(&mut self, surface: &Surface, place: (usize, usize)) -> Fold {
-        let gain = self.tools.high[place.0].1;
+        let gain = self.tools.thin[place.0].1;
         let level = &self.view.levels[place.0];
         let cell = self.short_px(surface.depth) / level.scale;
         let t = &mut self.tools;
@@ -280,7 +299,7 @@ impl Workspace {
         polarities: &[Polarity],
         blurs: &[f64],
     ) -> (f64, Polarity, f64) {
-        self.high(level, self.view.high_pass_px(cell));
+        self.high(level, cell);
         let area = self.view.levels[level].scale.powi(2);
         let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
         self.tools.map.fill(surface, &self.view.levels[level]);
@@ -311,7 +330,7 @@ impl Workspace {
         let cell = self.cell_px(surface.depth);
         let level = self.view.level_for(self.short_px(surface.depth), 20.0);
         let tiling = self.view.tiling_for(cell);
-        self.high(level, self.view.high_pass_px(cell));
+        self.high(level, cell);
         let drawing = self.drawing(level, cell, lock.polarity, lock.blur);
         let t = &mut self.tools;
         let view = &self.view.levels[level];
