@@ -71,8 +71,9 @@ impl Score {
         self.cells_px / self.in_view.max(1) as f64
     }
 
-    /// Area under the curve of missing against intact twines, and the share of the missing ones found at [`FALSE_RATE`].
-    pub fn missing_twines(&self) -> (f64, f64) {
+    /// Area under the curve of missing against intact twines, the share of the missing ones found at [`FALSE_RATE`], and the log likelihood ratio
+    /// at which that is.
+    pub fn missing_twines(&self) -> (f64, f64, f32) {
         let mut intact = self.intact.clone();
         intact.sort_by(f32::total_cmp);
         let below: usize = self.missing.iter().map(|m| intact.partition_point(|x| x <= m)).sum();
@@ -80,13 +81,13 @@ impl Score {
         let allowed = (FALSE_RATE * intact.len() as f64) as usize;
         let threshold = intact.get(allowed).copied().unwrap_or(f32::MIN);
         let found = self.missing.iter().filter(|m| **m < threshold).count();
-        (auc, found as f64 / self.missing.len().max(1) as f64)
+        (auc, found as f64 / self.missing.len().max(1) as f64, threshold)
     }
 }
 
 impl std::fmt::Display for Score {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (auc, found) = self.missing_twines();
+        let (auc, found, _) = self.missing_twines();
         write!(
             f,
             "cells {:4.1} px, {:4} visible, recall {:.3}, precision {:.4}, RMSE {:.3} ({:.3}), false holes {}",

@@ -31,7 +31,7 @@ pub fn print(kinds: &[Kind]) {
     }
     println!();
     println!(
-        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 | holes of 2 or more found | single twines found | false holes |"
+        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 (log likelihood ratio) | holes of 2 or more found | single twines found | false holes |"
     );
     println!("|{}", "---|".repeat(9));
     for kind in kinds {
@@ -44,9 +44,9 @@ pub fn print(kinds: &[Kind]) {
 }
 
 fn print_missing(name: &str, pose: &str, score: &Score) {
-    let (auc, found) = score.missing_twines();
+    let (auc, found, threshold) = score.missing_twines();
     println!(
-        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} | {}/{} | {}/{} | {} |",
+        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} ({threshold:.1}) | {}/{} | {}/{} | {} |",
         score.missing.len(),
         score.intact.len(),
         score.large[0],

@@ -4,13 +4,14 @@ use net_image::GrayView;
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::connect::Connector;
-use crate::adjust::graph::{Graph, predict};
+use crate::adjust::graph::{Graph, median};
+use crate::adjust::grow::{Grower, Warped};
 use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
-use crate::adjust::presence::{Presence, Twine, TwineState, template_half};
-use crate::adjust::profile::{Profiles, STEP_PX};
+use crate::adjust::presence::{Presence, Twine, TwineState};
+use crate::adjust::profile::{COARSE_PX, FINE_PX, Profiles, Source};
 use crate::adjust::solve::Solver;
-use crate::adjust::warp::{Warp, Warped, radii};
+use crate::adjust::template::Look;
 use crate::error::{Error, Result};
 
 /// No junction is claimed to be known better than this, px.
@@ -18,6 +19,12 @@ const SIGMA_MIN_PX: f64 = 0.03;
 /// Standard deviation of the distance, in twine diameters, between a twine's axis and the middle of its brightness: light from
 /// above makes the upper flank of white twine bright. Thin twine does not tell.
 const SHADING: f64 = 0.12;
+/// Log odds that twine in the middle of a net is there, and the part of the gate that its neighbourhood must stand out by: fewer
+/// twines are broken than that.
+const LIKELY_PRIOR: f64 = 2.0;
+const LIKELY_GATE: f64 = 0.7;
+/// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
+const ROUNDS: [usize; 2] = [4, 3];
 
 /// Adjusts a predicted lattice to a picture, node by node. Owns all buffers: after the first pictures no memory is allocated.
 #[derive(Debug)]
@@ -25,13 +32,15 @@ pub struct NetAdjuster {
     config: AdjustConfig,
     width: usize,
     height: usize,
+    source: Source,
     graph: Graph,
+    grower: Grower,
     profiles: Profiles,
     locator: Locator,
     solver: Solver,
     presence: Presence,
     connector: Connector,
-    heights: Vec<f32>,
+    values: Vec<f32>,
     junctions: Vec<Junction>,
     twine_m: f64,
 }
@@ -53,12 +62,14 @@ impl NetAdjuster {
             config: config.clone(),
             width,
             height,
+            source: Source::default(),
+            grower: Grower::default(),
             profiles: Profiles::default(),
             locator: Locator::default(),
             solver: Solver::default(),
             presence: Presence::default(),
             connector: Connector::default(),
-            heights: Vec::new(),
+            values: Vec::new(),
             junctions: Vec::new(),
             twine_m: f64::NAN,
         })
@@ -80,69 +91,69 @@ impl NetAdjuster {
         }
         self.junctions.clear();
         self.presence.twines.clear();
-        let Self { config, graph, profiles, locator, solver, presence, .. } = self;
+        self.twine_m = f64::NAN;
+        let seed = map.seed().and_then(|(i, j)| map.pixel(f64::from(i), f64::from(j)));
+        let Some(seed) = seed.filter(|p| p.x.is_finite() && p.y.is_finite()) else { return Ok(&self.junctions) };
+        let Self { config, source, graph, grower, profiles, locator, solver, presence, .. } = self;
         let (width, height, least) = (self.width, self.height, config.cell_min_px);
-        profiles.load(image);
-        let mut twine = config.twines_m[config.twines_m.len() / 2];
-        let locate_and_solve = |graph: &mut Graph,
-                                profiles: &mut Profiles,
-                                locator: &mut Locator,
-                                solver: &mut Solver,
-                                twine: f64,
-                                search: f64| {
-            locator.locate(graph, profiles, twine, search, config);
-            solver.solve(graph, &profiles.along, &locator.offsets, &locator.weights, config);
-        };
-        // 1. Outward from the seed: what the prediction misses smoothly.
-        let seed =
-            map.seed().and_then(|(i, j)| Some((map.pixel(f64::from(i), f64::from(j))?, predict(map, (i, j))?.height)));
-        let Some((seed, cell)) = seed else { return Ok(&self.junctions) };
-        let mut warp = Warp::none(seed);
-        let diagonal = (width as f64).hypot(height as f64);
-        for (round, radius) in radii(cell, diagonal).enumerate() {
-            graph.build(&Warped { map, warp: &warp }, width, height, least, radius);
-            if graph.edges.is_empty() {
-                continue;
-            }
-            locate_and_solve(graph, profiles, locator, solver, twine, config.search_cells[0]);
-            warp.fit(graph, solver, map, 1 + round.div_ceil(2));
-        }
-        // 2. Whether that helps, over the whole picture: a correction that leads astray finds less.
-        let mut best = (f32::MIN, Warp::none(seed));
-        for warp in [best.1.clone(), warp] {
-            graph.build(&Warped { map, warp: &warp }, width, height, least, f64::MAX);
-            if graph.edges.is_empty() {
-                continue;
-            }
-            locate_and_solve(graph, profiles, locator, solver, twine, config.search_cells[0]);
-            let found = solver.weight();
-            if found > best.0 {
-                best = (found, warp);
-            }
-        }
-        // 3. All nodes in view and their twines' bows, from wide to narrow search.
-        graph.build(&Warped { map, warp: &best.1 }, width, height, least, f64::MAX);
+        source.load(image);
+        graph.build(map, width, height, least);
         if graph.edges.is_empty() {
             return Ok(&self.junctions);
         }
-        for (pass, &search) in config.search_cells.iter().enumerate() {
-            locate_and_solve(graph, profiles, locator, solver, twine, search);
-            if pass == 0 {
-                twine = locator.fit_twine(graph, profiles, config);
+        // 1. Outward from the seed: what the prediction misses smoothly. Once more if the camera moved.
+        let mut look = Look {
+            twine_m: config.twines_m[config.twines_m.len() / 2],
+            blur_px: [0.0; 2],
+            spread_px: config.point_spread_px,
+        };
+        let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
+        let diagonal = (width as f64).hypot(height as f64);
+        for moving in [false, true] {
+            let warp = grower.grow(source, graph, seed, diagonal, &look, config);
+            graph.build(&Warped { map, warp: &warp }, width, height, least);
+            if graph.edges.is_empty() {
+                return Ok(&self.junctions);
             }
+            if moving {
+                break;
+            }
+            look.blur_px = locator.fit_blur(source, graph, profiles, cell, &look, config);
+            if look.blur_px == [0.0; 2] {
+                break;
+            }
+            graph.build(map, width, height, least);
         }
-        self.twine_m = twine;
+        // 2. All nodes in view, from wide to narrow search on the same profiles.
+        let (last, wider) = config.search_cells.split_last().unwrap_or((&0.12, &[]));
+        if let Some(&widest) = wider.first() {
+            locator.look(source, graph, &look, widest, COARSE_PX);
+            solver.start(graph, &locator.profiles.along, config);
+            for (pass, &search) in wider.iter().enumerate() {
+                locator.reach(graph, search);
+                locator.pick(graph, (pass > 0).then_some(&*solver));
+                solver.solve(graph, &locator.offsets, &locator.weights, ROUNDS[usize::from(pass > 0)]);
+            }
+            solver.commit(graph);
+        }
+        let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
+        look.twine_m = locator.fit_twine(source, graph, profiles, cell, &look, config);
+        // 3. Along the bent twines, with their own width.
+        locator.look(source, graph, &look, *last, FINE_PX);
+        solver.start(graph, &locator.profiles.along, config);
+        locator.pick(graph, None);
+        solver.solve(graph, &locator.offsets, &locator.weights, ROUNDS[0]);
+        solver.commit(graph);
+        self.twine_m = look.twine_m;
         // 4. What is really there.
-        self.heights.clear();
-        self.heights.extend(graph.nodes.iter().map(|n| n.height as f32));
-        let height = f64::from(crate::adjust::graph::median(&mut self.heights).unwrap_or(0.0));
-        self.heights.clear();
-        self.heights.extend(graph.nodes.iter().map(|n| (n.scale * twine) as f32));
-        let width = f64::from(crate::adjust::graph::median(&mut self.heights).unwrap_or(0.0));
-        let half = template_half(height, width, config.point_spread_px);
+        let width = median_of(&mut self.values, graph.nodes.iter().map(|n| n.scale * look.twine_m));
+        let window = [0, 1].map(|family| look.window_px(width, cell, family));
+        let half = (window[0].max(window[1]) / FINE_PX).round() as usize;
         // The brighter flank of shaded twine is its extreme.
-        let beside = ((0.6 * width + 0.5).max(1.0) / STEP_PX).round() as usize;
-        presence.judge(graph, profiles, image, half, beside, config);
+        // And the top of what motion has blurred is flat.
+        let blur = look.blur_px[0].max(look.blur_px[1]);
+        let beside = ((0.6 * width + 0.5).max(1.0) + 0.5 * blur) / FINE_PX;
+        presence.judge(graph, &locator.profiles, source, image, half, beside.round() as usize, config);
         // 5. As far as names can be trusted.
         self.connector.walk(&self.graph, &self.presence.twines);
         self.report();
@@ -165,22 +176,30 @@ impl NetAdjuster {
     }
 
     fn report(&mut self) {
+        let (present, gate) = (self.config.present_llr, self.config.gate);
         for (k, node) in self.graph.nodes.iter().enumerate() {
-            if !self.connector.reached(k) {
+            if !self.connector.reached(k) || !node.inside {
                 continue;
             }
             let (i, j) = node.index;
             let before = [(i - 1, j), (i, j - 1)];
             let at = |n: usize, family: usize| {
                 let edge = self.graph.edge_from(n, family)?;
-                Some(self.presence.twines[edge].state)
+                Some(self.presence.twines[edge])
             };
             let twines = [0, 1].map(|f| [at(k, f), self.graph.node_at(before[f]).and_then(|n| at(n, f))]);
-            let any = |family: usize, state: TwineState| twines[family].contains(&Some(state));
+            let any = |family: usize, state: TwineState| twines[family].iter().flatten().any(|t| t.state == state);
+            // Twine that is likely on both sides of the knot is as good as one that is certain.
+            let seen = |family: usize| {
+                let open = twines[family].iter().flatten().filter(|t| t.state == TwineState::Unknown);
+                let likely =
+                    open.filter(|t| f64::from(t.contrast) > LIKELY_GATE * gate).map(|t| f64::from(t.llr)).sum::<f64>();
+                any(family, TwineState::Present) || likely + LIKELY_PRIOR > present
+            };
             let either = |state: TwineState| any(0, state) || any(1, state);
-            let missing = twines.iter().flatten().filter(|t| **t == Some(TwineState::Missing)).count();
+            let missing = twines.iter().flatten().flatten().filter(|t| t.state == TwineState::Missing).count();
             let known = twines.iter().flatten().flatten().count();
-            let state = if any(0, TwineState::Present) && any(1, TwineState::Present) {
+            let state = if seen(0) && seen(1) {
                 JunctionState::Seen
             } else if either(TwineState::Hidden) {
                 JunctionState::Hidden
@@ -193,10 +212,18 @@ impl NetAdjuster {
             };
             // Without measurements a node is known as well as its neighbours predict it.
             let prior = Matrix2::identity() / (self.config.jitter_cells * node.height + 0.1).powi(2);
-            let covariance = (self.solver.information[k] + prior).try_inverse().unwrap_or_else(Matrix2::identity);
+            let covariance =
+                (self.solver.information[k].cast::<f64>() + prior).try_inverse().unwrap_or_else(Matrix2::identity);
             let shading = SHADING * self.twine_m * node.scale;
             let sigma = (0.5 * covariance.trace()).sqrt().max(SIGMA_MIN_PX).hypot(shading);
             self.junctions.push(Junction { pixel: node.pixel(), index: Some(node.index), sigma_px: sigma, state });
         }
     }
+}
+
+/// Median of some values; 0 if there are none.
+fn median_of(buffer: &mut Vec<f32>, values: impl Iterator<Item = f64>) -> f64 {
+    buffer.clear();
+    buffer.extend(values.map(|v| v as f32));
+    f64::from(median(buffer).unwrap_or(0.0))
 }

@@ -4,12 +4,13 @@ use std::collections::VecDeque;
 
 use net_geometry::nalgebra::Vector2;
 
+use crate::adjust::blocks::Blocks;
 use crate::adjust::map::LatticeMap;
 
 /// No node or edge here.
 const NONE: u32 = u32::MAX;
 
-/// A node of the lattice in view.
+/// A node of the lattice in view, or one cell outside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Node {
     /// Lattice index.
@@ -24,8 +25,10 @@ pub(crate) struct Node {
     pub height: f64,
     /// Pixels per metre.
     pub scale: f64,
-    /// From here to the predicted node half a cell on along the first and second direction, px.
+    /// From here half a cell on along the first and second direction, px.
     pub half_steps: [Vector2<f64>; 2],
+    /// Whether it is predicted inside the picture.
+    pub inside: bool,
 }
 
 impl Node {
@@ -35,7 +38,7 @@ impl Node {
     }
 }
 
-/// A twine between two neighbouring nodes.
+/// A twine between two neighbouring nodes, one of them at least inside the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
     /// Nodes at its ends.
@@ -43,28 +46,32 @@ pub(crate) struct Edge {
     /// 0: along the first direction, 1: along the second.
     pub family: usize,
     /// Bow and S-bend, px, see [`bend`].
-    pub bow: [f64; 2],
+    pub bow: [f32; 2],
 }
 
 /// How far a twine lies off the chord at `along` from 0 to 1, for a bow and an S-bend of 1 px.
-pub(crate) fn bend(along: f64) -> [f64; 2] {
+pub(crate) fn bend(along: f32) -> [f32; 2] {
     let hump = along * (1.0 - along);
     [4.0 * hump, 10.4 * hump * (1.0 - 2.0 * along)]
 }
+
+/// An index to try, and the pixel of the node inside from which it was reached.
+type Candidate = ((i32, i32), Option<Vector2<f64>>);
 
 /// Nodes and edges in view; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
     pub edges: Vec<Edge>,
+    /// Neighbourhoods of edges.
+    pub blocks: Blocks,
     /// Edges that leave each node along both directions.
     outgoing: Vec<[u32; 2]>,
     /// Node at index `seed + (i, j)`, within `reach` of the seed.
     grid: Vec<u32>,
     reach: i32,
     seed: (i32, i32),
-    queue: VecDeque<(i32, i32)>,
-    scratch: Vec<f32>,
+    queue: VecDeque<Candidate>,
 }
 
 impl Graph {
@@ -93,8 +100,8 @@ impl Graph {
         (edge != NONE).then_some(edge as usize)
     }
 
-    /// Fills in what is in view, growing outward from the map's seed, up to `radius` px from it.
-    pub fn build(&mut self, map: &impl LatticeMap, width: usize, height: usize, cell_min_px: f64, radius: f64) {
+    /// Fills in what is in view and one cell more, growing outward from the map's seed.
+    pub fn build(&mut self, map: &impl LatticeMap, width: usize, height: usize, cell_min_px: f64) {
         for k in 0..self.nodes.len() {
             if let Some(slot) = self.slot(self.nodes[k].index) {
                 self.grid[slot] = NONE;
@@ -109,97 +116,125 @@ impl Graph {
         // The seed may itself be just outside: its neighbours are tried too.
         for i in -1..=1 {
             for j in -1..=1 {
-                self.queue.push_back((seed.0 + i, seed.1 + j));
+                self.queue.push_back(((seed.0 + i, seed.1 + j), None));
             }
         }
         let size = Vector2::new((width - 1) as f64, (height - 1) as f64);
-        let Some(middle) = map.pixel(f64::from(seed.0), f64::from(seed.1)) else { return };
-        while let Some(index) = self.queue.pop_front() {
+        while let Some((index, from)) = self.queue.pop_front() {
             let Some(slot) = self.slot(index) else { continue };
             if self.grid[slot] != NONE {
                 continue;
             }
-            let Some(node) = predict(map, index) else { continue };
-            let p = node.predicted;
+            let Some((p, scale)) = map.place(f64::from(index.0), f64::from(index.1)) else { continue };
             let inside = p.x >= 0.0 && p.y >= 0.0 && p.x <= size.x && p.y <= size.y;
-            if !(inside && node.height >= cell_min_px && (p - middle).norm() <= radius) {
+            // Twines are no farther apart than the nodes on them.
+            let step = from.map_or(f64::MAX, |from| (p - from).norm());
+            let near = inside || from.is_some() && step < size.x + size.y;
+            if !(near && scale > 0.0 && scale.is_finite() && step >= cell_min_px) {
                 continue;
             }
             self.grid[slot] = self.nodes.len() as u32;
-            self.nodes.push(node);
-            let (i, j) = index;
-            self.queue.extend([(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]);
+            self.nodes.push(Node {
+                index,
+                predicted: p,
+                shift: Vector2::zeros(),
+                spacing: [0.0; 2],
+                height: 0.0,
+                scale,
+                half_steps: [Vector2::zeros(); 2],
+                inside,
+            });
+            if inside {
+                let (i, j) = index;
+                self.queue.extend([(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)].map(|n| (n, Some(p))));
+            }
         }
+        self.measure_cells();
+        self.drop_small(cell_min_px);
         for k in 0..self.nodes.len() {
             let (i, j) = self.nodes[k].index;
             let mut outgoing = [NONE; 2];
             for (family, next) in [(i + 1, j), (i, j + 1)].into_iter().enumerate() {
-                if let Some(other) = self.node_at(next) {
+                if let Some(other) = self.node_at(next)
+                    && (self.nodes[k].inside || self.nodes[other].inside)
+                {
                     outgoing[family] = self.edges.len() as u32;
                     self.edges.push(Edge { nodes: [k as u32, other as u32], family, bow: [0.0; 2] });
                 }
             }
             self.outgoing.push(outgoing);
         }
+        self.blocks.build(&self.nodes, &self.edges);
     }
 
-    /// Calls `visit` with every edge of the same family at most `radius` cells from an edge, itself included.
-    #[inline]
-    pub fn for_neighbours(&self, edge: usize, radius: i32, mut visit: impl FnMut(usize)) {
-        let Edge { nodes, family, .. } = self.edges[edge];
-        let (i, j) = self.nodes[nodes[0] as usize].index;
-        for di in -radius..=radius {
-            let Some(slot) = self.slot((i + di, j)) else { continue };
-            let column = j - self.seed.1 + self.reach;
-            let row = slot - column as usize;
-            let (low, high) = ((column - radius).max(0), (column + radius).min(2 * self.reach));
-            for &node in &self.grid[row + low as usize..=row + high as usize] {
-                if node != NONE && self.outgoing[node as usize][family] != NONE {
-                    visit(self.outgoing[node as usize][family] as usize);
-                }
+    /// Half steps and spacings from the predicted neighbours.
+    fn measure_cells(&mut self) {
+        for k in 0..self.nodes.len() {
+            let (i, j) = self.nodes[k].index;
+            let here = self.nodes[k].predicted;
+            let at = |index| self.node_at(index).map(|n| self.nodes[n].predicted);
+            let half =
+                [[(i + 1, j), (i - 1, j)], [(i, j + 1), (i, j - 1)]].map(|[next, last]| match (at(next), at(last)) {
+                    (Some(next), Some(last)) => (next - last) * 0.25,
+                    (Some(next), None) => (next - here) * 0.5,
+                    (None, Some(last)) => (here - last) * 0.5,
+                    (None, None) => Vector2::zeros(),
+                });
+            let node = &mut self.nodes[k];
+            let area = 4.0 * half[0].perp(&half[1]).abs();
+            node.half_steps = half;
+            node.spacing = half.map(|step| area / (2.0 * step.norm()));
+            node.height = node.spacing[0].min(node.spacing[1]);
+        }
+        // A node outside often has one neighbour only: cells are those of that neighbour.
+        for k in 0..self.nodes.len() {
+            if self.nodes[k].inside {
+                continue;
+            }
+            let (i, j) = self.nodes[k].index;
+            let around = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)];
+            let neighbour = around.into_iter().filter_map(|n| self.node_at(n)).find(|&n| self.nodes[n].inside);
+            if let Some(n) = neighbour {
+                let Node { spacing, height, half_steps, .. } = self.nodes[n];
+                self.nodes[k] = Node { spacing, height, half_steps, ..self.nodes[k] };
             }
         }
     }
 
-    /// Median over each edge's neighbourhood into `out` (cleared first); NaN values do not count, and edges without any get the
-    /// overall median, or 0 if there is none.
-    pub fn local_median(&mut self, values: &[f32], radius: i32, out: &mut Vec<f32>) {
-        let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.clear();
-        scratch.extend(values.iter().filter(|v| !v.is_nan()));
-        let overall = median(&mut scratch).unwrap_or(0.0);
-        out.clear();
-        for edge in 0..self.edges.len() {
-            scratch.clear();
-            self.for_neighbours(edge, radius, |e| {
-                if !values[e].is_nan() {
-                    scratch.push(values[e]);
-                }
-            });
-            out.push(median(&mut scratch).unwrap_or(overall));
+    fn drop_small(&mut self, cell_min_px: f64) {
+        let mut kept = 0;
+        for k in 0..self.nodes.len() {
+            let node = self.nodes[k];
+            // False for NaN.
+            let large = node.height >= cell_min_px;
+            if let Some(slot) = self.slot(node.index) {
+                self.grid[slot] = if large { kept as u32 } else { NONE };
+            }
+            if large {
+                self.nodes[kept] = node;
+                kept += 1;
+            }
         }
-        self.scratch = scratch;
+        self.nodes.truncate(kept);
     }
+}
+
+/// The value that four of five do not exceed; reorders. Of a picture that is half water it is one of net.
+pub(crate) fn upper(values: &mut [f32]) -> Option<f32> {
+    if values.is_empty() {
+        return None;
+    }
+    let at = values.len() * 4 / 5;
+    Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
 }
 
 /// Upper median; reorders.
 pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
+    if values.is_empty() {
+        return None;
+    }
     let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
-}
-
-/// The node with this index where the map predicts it.
-pub(crate) fn predict(map: &impl LatticeMap, index: (i32, i32)) -> Option<Node> {
-    let (i, j) = (f64::from(index.0), f64::from(index.1));
-    let predicted = map.pixel(i, j)?;
-    let (a, b) = (map.pixel(i + 0.5, j)?, map.pixel(i, j + 0.5)?);
-    let half_steps = [a - predicted, b - predicted];
-    let area = 4.0 * half_steps[0].perp(&half_steps[1]).abs();
-    let spacing = half_steps.map(|step| area / (2.0 * step.norm()));
-    let height = spacing[0].min(spacing[1]);
-    let scale = map.pixels_per_metre(i, j)?;
-    (predicted.x.is_finite() && predicted.y.is_finite() && height.is_finite() && scale.is_finite() && scale > 0.0)
-        .then_some(Node { index, predicted, shift: Vector2::zeros(), spacing, height, scale, half_steps })
+    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 #[cfg(test)]
@@ -225,29 +260,36 @@ mod tests {
     fn every_node_in_the_picture_is_there_once() {
         let mut graph = Graph::new(100, 60, 4.5);
         for _ in 0..2 {
-            graph.build(&Flat(10.0), 100, 60, 4.5, f64::MAX);
-            // u from 0 to 90, v from 0 to 50.
-            assert_eq!(graph.nodes.len(), 10 * 6);
-            assert_eq!(graph.edges.len(), 9 * 6 + 10 * 5);
+            graph.build(&Flat(10.0), 100, 60, 4.5);
+            // u from 0 to 90, v from 0 to 50; around them one more.
+            assert_eq!(graph.nodes.iter().filter(|n| n.inside).count(), 10 * 6);
+            assert_eq!(graph.nodes.len(), 10 * 6 + 2 * 10 + 2 * 6);
+            assert_eq!(graph.edges.len(), 11 * 6 + 10 * 7);
             assert_eq!(graph.nodes[graph.node_at((0, 0)).expect("in view")].predicted, Vector2::new(10.0, 20.0));
-            assert!(graph.node_at((9, 0)).is_none());
+            assert!(graph.nodes.iter().all(|n| n.height == 10.0));
+            assert!(graph.node_at((10, 0)).is_none());
             assert!(graph.node_at((i32::MAX, i32::MIN)).is_none());
         }
-        graph.build(&Flat(4.0), 100, 60, 4.5, f64::MAX);
-        assert!(graph.nodes.is_empty());
+        graph.build(&Flat(4.0), 100, 60, 4.5);
+        assert!(graph.edges.is_empty());
     }
 
     #[test]
     fn the_median_is_over_neighbours_of_the_same_family() {
         let mut graph = Graph::new(100, 60, 4.5);
-        graph.build(&Flat(10.0), 100, 60, 4.5, f64::MAX);
+        graph.build(&Flat(10.0), 100, 60, 4.5);
         let value = |e: &Edge| if e.family == 0 { graph.nodes[e.nodes[0] as usize].index.0 as f32 } else { f32::NAN };
         let values: Vec<_> = graph.edges.iter().map(value).collect();
         let mut out = Vec::new();
-        graph.local_median(&values, 1, &mut out);
+        graph.blocks.local_median(&values, &mut out);
         let middle = graph.node_at((3, 1)).expect("in view");
-        assert_eq!(out[graph.edge_from(middle, 0).expect("in view")], 3.0);
-        // No value at all among the second family: the overall median, of 0 to 7 and -1.
-        assert_eq!(out[graph.edge_from(middle, 1).expect("in view")], 3.0);
+        let of = |family| {
+            let edge = graph.edge_from(middle, family).expect("in view");
+            out[graph.blocks.of_edge(edge)]
+        };
+        // Columns -2 to 8 in blocks of three from -2 on: around the one of 1 to 3 lie -2 to 6.
+        assert_eq!(of(0), 2.0);
+        // No value at all among the second family: the overall median, of -2 to 8.
+        assert_eq!(of(1), 3.0);
     }
 }

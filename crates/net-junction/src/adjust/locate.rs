@@ -1,32 +1,46 @@
 //! Where each twine lies, bin by bin: matched filter, local polarity, local amplitude.
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::{Graph, median};
-use crate::adjust::profile::{Profiles, STEP_PX};
-use crate::adjust::solve::WEIGHT_MAX;
-use crate::adjust::template::{Kernel, Kernels, Match};
+use crate::adjust::graph::{Edge, Graph, bend, median, upper};
+use crate::adjust::profile::{COARSE_PX, Profiles, Source};
+use crate::adjust::solve::{Solver, WEIGHT_MAX};
+use crate::adjust::template::{Kernel, Kernels, Look};
 
-/// Cells to each side over which polarity and amplitude are compared.
-const POLARITY_RADIUS: i32 = 4;
-const AMPLITUDE_RADIUS: i32 = 3;
 /// Amplitudes outside these parts of the neighbours' are something else than twine.
 const AMPLITUDE_PARTS: (f32, f32) = (0.35, 3.0);
+/// Least noise, in parts of strong twine's amplitude.
+const LEAST_NOISE: f32 = 0.15;
 /// Twine is looked for this far at least and at most, px.
 const SEARCH_PX: (f64, f64) = (1.0, 9.0);
+/// Length over which what the template leaves, as a sum of squares, is taken for noise, px: misfit counts as noise.
+const REST_PX: f32 = 2.5;
+/// Ways of the picture during the exposure that are tried, px; none longer than this part of a cell. Shorter ones leave twine where it is.
+const BLURS_PX: [f64; 6] = [5.0, 6.5, 8.0, 10.0, 12.0, 16.0];
+const BLUR_CELLS: f64 = 0.6;
+/// Share of the variance that motion must explain on top.
+const BLUR_GAIN: f32 = 0.1;
+/// Twines on which the diameter is tried.
+const FIT_TWINES: usize = 250;
 
 /// Measured offsets of all bins; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Locator {
+    pub profiles: Profiles,
     kernels: Kernels,
     kernel_of_edge: Vec<Kernel>,
-    heights: Vec<f32>,
     /// How far each edge is looked for, px.
-    reaches: Vec<f64>,
-    matches: Vec<Match>,
+    reaches: Vec<f32>,
+    /// Offsets on each side at which `responses` are.
+    steps: usize,
+    /// For each edge and bin the amplitudes at every offset.
+    responses: Vec<f32>,
     /// For each edge the amplitudes, averaged over its bins, at every offset; limited.
     lines: Vec<f32>,
+    /// By block.
     signs: Vec<f32>,
+    /// By edge and bin: offset, in steps, at which twine is picked, and the amplitude there.
     picked: Vec<(usize, f32)>,
+    /// By edge: twine's typical amplitude; by block: around it.
     amplitudes: Vec<f32>,
     typical: Vec<f32>,
     scratch: Vec<f32>,
@@ -38,17 +52,11 @@ pub(crate) struct Locator {
 }
 
 impl Locator {
-    /// Window of the matched filter on each side of its middle, steps: wide enough for twine and its blur, not for its neighbours.
-    fn kernels_for(&mut self, graph: &Graph, twine: f64, config: &AdjustConfig) {
-        self.kernels.clear();
+    fn kernels_for(&mut self, graph: &Graph, look: &Look, step_px: f64) {
+        self.kernels.start(step_px);
         self.kernel_of_edge.clear();
-        let sigma = config.point_spread_px;
-        for edge in &graph.edges {
-            let [a, b] = edge.nodes.map(|n| &graph.nodes[n as usize]);
-            let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
-            let cell = a.spacing[edge.family].min(b.spacing[edge.family]);
-            let half = (0.3 * cell).max(2.0).min(0.8 * width + 3.0 * sigma + 1.5);
-            self.kernel_of_edge.push(self.kernels.get(width, sigma, (half / STEP_PX).round() as usize));
+        for e in 0..graph.edges.len() {
+            self.kernel_of_edge.push(kernel_for(&mut self.kernels, graph, e, look));
         }
     }
 
@@ -56,35 +64,33 @@ impl Locator {
         self.kernel_of_edge.iter().map(Kernel::half).max().unwrap_or(0)
     }
 
-    fn median_height(&mut self, graph: &Graph) -> f64 {
-        self.heights.clear();
-        self.heights.extend(graph.nodes.iter().map(|n| n.height as f32));
-        f64::from(median(&mut self.heights).unwrap_or(0.0))
-    }
-
     /// The diameter, m, of those tried that explains most of the profiles' variance, on some hundreds of twines.
-    pub fn fit_twine(&mut self, graph: &Graph, profiles: &mut Profiles, config: &AdjustConfig) -> f64 {
-        let half = (0.35 * self.median_height(graph)).clamp(2.0, 9.0) / STEP_PX;
-        let half = half.round() as usize;
-        let stride = (graph.edges.len() / 600).max(1);
-        profiles.sample(graph, half, false, stride);
+    pub fn fit_twine(
+        &mut self,
+        source: &Source,
+        graph: &Graph,
+        scratch: &mut Profiles,
+        height: f64,
+        look: &Look,
+        config: &AdjustConfig,
+    ) -> f64 {
+        let half = ((0.35 * height).clamp(2.0, 9.0) / COARSE_PX).round() as usize;
+        // Odd: both families in turn.
+        let stride = (graph.edges.len() / FIT_TWINES) | 1;
+        scratch.sample(source, graph, (half, COARSE_PX), false, stride, Some(1));
         let mut best = (f32::MIN, config.twines_m[0]);
         for &twine in &config.twines_m {
-            self.kernels.clear();
+            self.kernels.start(COARSE_PX);
             self.scratch.clear();
             for e in (0..graph.edges.len()).step_by(stride) {
-                let [a, b] = graph.edges[e].nodes.map(|n| &graph.nodes[n as usize]);
+                let Edge { nodes, family, .. } = graph.edges[e];
+                let [a, b] = nodes.map(|n| &graph.nodes[n as usize]);
                 let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
-                let kernel = self.kernels.get(width, config.point_spread_px, half);
-                self.sum.clear();
-                self.sum.resize(profiles.width(), 0.0);
-                for bin in 0..profiles.bins {
-                    self.sum.iter_mut().zip(profiles.row(e, bin)).for_each(|(s, p)| *s += p);
-                }
-                let found = self.kernels.match_at(&kernel, &self.sum, half);
+                let kernel = self.kernels.get(width, look.spread_px, look.blur_px[family], half);
+                let found = self.kernels.match_at(&kernel, scratch.row(e, 0), half);
                 self.scratch.push(found.gain / found.rest.max(1e-9));
             }
-            let explained = median(&mut self.scratch).unwrap_or(0.0);
+            let explained = upper(&mut self.scratch).unwrap_or(0.0);
             if explained > best.0 {
                 best = (explained, twine);
             }
@@ -92,47 +98,86 @@ impl Locator {
         best.1
     }
 
-    /// Measures where twine lies within `search_cells` of where it is believed, into `offsets` and `weights`.
-    pub fn locate(
+    /// How far, px, the picture moved across the twines of each family while the shutter was open: the way that explains most of the
+    /// profiles' variance, wherever in reach twine then lies.
+    pub fn fit_blur(
         &mut self,
-        graph: &mut Graph,
-        profiles: &mut Profiles,
-        twine: f64,
-        search_cells: f64,
+        source: &Source,
+        graph: &Graph,
+        scratch: &mut Profiles,
+        height: f64,
+        look: &Look,
         config: &AdjustConfig,
-    ) {
-        self.kernels_for(graph, twine, config);
-        self.reaches.clear();
-        self.reaches.extend(graph.edges.iter().map(|e| {
-            let [a, b] = e.nodes.map(|n| graph.nodes[n as usize].spacing[e.family]);
-            (search_cells * a.min(b)).clamp(SEARCH_PX.0, SEARCH_PX.1)
-        }));
-        let farthest = self.reaches.iter().fold(SEARCH_PX.0, |a, &b| a.max(b));
-        let steps = (farthest / STEP_PX).ceil() as usize;
-        profiles.sample(graph, steps + self.widest(), false, 1);
-        self.match_all(graph, profiles, steps);
-        self.settle_signs(graph, steps);
-        self.pick(graph, profiles, steps);
-        self.weigh(graph, profiles);
+    ) -> [f64; 2] {
+        if BLUR_CELLS * height < BLURS_PX[0] {
+            return [0.0; 2];
+        }
+        let cell = height.min(3.0 * BLURS_PX[BLURS_PX.len() - 1]);
+        let (half, shifts) = ((0.5 * cell).round().max(3.0) as usize, (0.3 * cell).ceil() as usize);
+        let stride = (graph.edges.len() / FIT_TWINES) | 1;
+        scratch.sample(source, graph, (half + shifts, COARSE_PX), false, stride, Some(1));
+        [0, 1].map(|family| {
+            let mut best = (f32::MIN, 0.0);
+            let still = config.twines_m.iter().map(|&twine| (twine, 0.0));
+            let moving = BLURS_PX.into_iter().take_while(|b| *b <= BLUR_CELLS * cell).map(|b| (look.twine_m, b));
+            for (twine, blur) in still.chain(moving) {
+                self.kernels.start(COARSE_PX);
+                self.scratch.clear();
+                for e in (0..graph.edges.len()).step_by(stride).filter(|&e| graph.edges[e].family == family) {
+                    let [a, b] = graph.edges[e].nodes.map(|n| &graph.nodes[n as usize]);
+                    let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
+                    let kernel = self.kernels.get(width, look.spread_px, blur, half);
+                    let explained = (0..=2 * shifts).map(|k| {
+                        let found = self.kernels.match_at(&kernel, scratch.row(e, 0), half + k);
+                        found.gain / found.rest.max(1e-9)
+                    });
+                    self.scratch.push(explained.fold(0.0, f32::max));
+                }
+                let explained = upper(&mut self.scratch).unwrap_or(0.0);
+                // Only what is well better than no motion.
+                let explained = if blur > 0.0 { explained - BLUR_GAIN } else { explained };
+                if explained > best.0 {
+                    best = (explained, blur);
+                }
+            }
+            best.1
+        })
     }
 
-    fn match_all(&mut self, graph: &Graph, profiles: &Profiles, steps: usize) {
-        let places = 2 * steps + 1;
-        self.matches.clear();
-        for (e, kernel) in self.kernel_of_edge.iter().enumerate() {
-            for bin in 0..profiles.bins {
-                let profile = profiles.row(e, bin);
-                let first = profiles.half - steps;
-                self.matches.extend((0..places).map(|k| self.kernels.match_at(kernel, profile, first + k)));
-            }
+    /// Samples the picture across every twine, as far as it is looked for, and filters what is there. Offsets are from where nodes are
+    /// believed to be now.
+    pub fn look(&mut self, source: &Source, graph: &Graph, look: &Look, search_cells: f64, step_px: f64) {
+        self.kernels_for(graph, look, step_px);
+        self.reach(graph, search_cells);
+        let farthest = self.reaches.iter().fold(0.0_f32, |a, &b| a.max(b));
+        self.steps = (f64::from(farthest) / step_px).ceil() as usize + 1;
+        self.profiles.sample(source, graph, (self.steps + self.widest(), step_px), false, 1, None);
+        let places = 2 * self.steps + 1;
+        let first = self.profiles.half - self.steps;
+        self.responses.clear();
+        self.responses.resize(graph.edges.len() * self.profiles.bins * places, 0.0);
+        for (k, out) in self.responses.chunks_exact_mut(places).enumerate() {
+            let (edge, bin) = (k / self.profiles.bins, k % self.profiles.bins);
+            self.kernels.amplitudes(&self.kernel_of_edge[edge], self.profiles.row(edge, bin), first, out);
         }
-        debug_assert_eq!(self.matches.len(), graph.edges.len() * profiles.bins * places);
-        let bins = profiles.bins;
+        self.settle_signs(graph);
+    }
+
+    /// How far twine is looked for from now on, cells; no farther than it was sampled.
+    pub fn reach(&mut self, graph: &Graph, search_cells: f64) {
+        self.reaches.clear();
+        self.reaches.extend((0..graph.edges.len()).map(|e| reach_px(graph, e, search_cells)));
+    }
+
+    /// Whether twine is light or dark, by the strongest line in reach in the neighbourhood.
+    fn settle_signs(&mut self, graph: &Graph) {
+        let (bins, places) = (self.profiles.bins, 2 * self.steps + 1);
         self.lines.clear();
-        for edge in self.matches.chunks_exact(bins * places) {
-            for k in 0..places {
-                let sum: f32 = edge.iter().skip(k).step_by(places).map(|m| m.amplitude).sum();
-                self.lines.push(sum / bins as f32);
+        self.lines.resize(graph.edges.len() * places, 0.0);
+        let share = 1.0 / bins as f32;
+        for (line, edge) in self.lines.chunks_exact_mut(places).zip(self.responses.chunks_exact(bins * places)) {
+            for row in edge.chunks_exact(places) {
+                line.iter_mut().zip(row).for_each(|(l, a)| *l += share * a);
             }
         }
         // One rope or fish must not outvote eighty twines.
@@ -141,98 +186,131 @@ impl Locator {
         self.scratch.extend(self.lines.chunks_exact(places).map(strongest));
         let limit = 1.5 * median(&mut self.scratch).unwrap_or(0.0) + 1e-6;
         self.lines.iter_mut().for_each(|a| *a = a.clamp(-limit, limit));
-    }
-
-    /// Whether twine is light or dark, by the strongest line in reach in the neighbourhood. Weights fall slowly: beside a twine the filter
-    /// answers with the other sign, a third as strong, and a twine that is farther off than predicted must still outdo that.
-    fn settle_signs(&mut self, graph: &Graph, steps: usize) {
-        let places = 2 * steps + 1;
         self.signs.clear();
-        for e in 0..graph.edges.len() {
-            let near = |k: usize| {
-                let q = (k as f64 - steps as f64) * STEP_PX;
-                if q.abs() > self.reaches[e] {
-                    0.0
-                } else {
-                    (-0.5 * (q / (self.reaches[e] + 0.5)).powi(2)).exp() as f32
-                }
+        for block in 0..graph.blocks.count() {
+            let Some(&first) = graph.blocks.members(block).first() else {
+                self.signs.push(1.0);
+                continue;
             };
+            let reach = self.reaches[first as usize];
             self.sum.clear();
             self.sum.resize(places, 0.0);
-            graph.for_neighbours(e, POLARITY_RADIUS, |n| {
-                let line = &self.lines[n * places..][..places];
+            for &e in graph.blocks.around(block).into_iter().flatten() {
+                let line = &self.lines[e as usize * places..][..places];
                 self.sum.iter_mut().zip(line).for_each(|(s, a)| *s += a);
-            });
-            let strongest = (0..places)
-                .map(|k| self.sum[k] * near(k))
-                .fold(0.0_f32, |best, s| if s.abs() > best.abs() { s } else { best });
-            self.signs.push(if strongest < 0.0 { -1.0 } else { 1.0 });
+            }
+            self.signs.push(sign(&self.sum, reach / self.profiles.step_px as f32));
         }
     }
 
-    /// The best place of each bin, to a fraction of a step.
-    fn pick(&mut self, graph: &Graph, profiles: &Profiles, steps: usize) {
-        let places = 2 * steps + 1;
+    /// Measures where twine lies within reach of where `solver` has it, into `offsets` and `weights`.
+    pub fn pick(&mut self, graph: &mut Graph, solver: Option<&Solver>) {
+        let (bins, places) = (self.profiles.bins, 2 * self.steps + 1);
+        let step = self.profiles.step_px as f32;
         self.picked.clear();
         self.offsets.clear();
-        for e in 0..graph.edges.len() {
-            let (sign, reach) = (self.signs[e], self.reaches[e]);
-            let prior = |k: usize| {
-                let q = (k as f64 - steps as f64) * STEP_PX;
-                if q.abs() > reach { 0.0 } else { (-0.5 * (q / (0.6 * reach + 0.3)).powi(2)).exp() as f32 }
-            };
-            for bin in 0..profiles.bins {
-                let matches = &self.matches[(e * profiles.bins + bin) * places..][..places];
+        self.weights.clear();
+        for (e, edge) in graph.edges.iter().enumerate() {
+            let (sign, reach) = (self.signs[graph.blocks.of_edge(e)], self.reaches[e]);
+            let kernel = &self.kernel_of_edge[e];
+            let inverse = 1.0 / (0.6 * reach + 0.3).powi(2);
+            for bin in 0..bins {
+                let along = self.profiles.along[bin];
+                let [bow, s_bend] = bend(along);
+                // The profile's middle lies on the line as it was when it was sampled.
+                let bent = bow * edge.bow[0] + s_bend * edge.bow[1];
+                let believed = solver.map_or(0.0, |s| s.offset(graph, e, along) - bent);
+                let row = &self.responses[(e * bins + bin) * places..][..places];
+                let middle = believed / step + self.steps as f32;
+                let low = (middle - reach / step).ceil().clamp(0.0, (places - 1) as f32) as usize;
+                let high = (middle + reach / step).floor().clamp(0.0, (places - 1) as f32) as usize;
                 let mut best = (0, 0.0_f32);
-                for (k, m) in matches.iter().enumerate() {
-                    let gain = if m.amplitude * sign > 0.0 { m.gain * prior(k) } else { 0.0 };
-                    if gain > best.1 {
-                        best = (k, gain);
+                for (k, &amplitude) in row.iter().enumerate().take(high + 1).skip(low) {
+                    let q = (k as f32 - middle) * step;
+                    // A bell without an exponential.
+                    let near = 1.0 / (1.0 + 0.25 * q * q * inverse).powi(2);
+                    let amplitude = (amplitude * sign).max(0.0) * near;
+                    if amplitude > best.1 {
+                        best = (k, amplitude);
                     }
                 }
-                self.picked.push(best);
                 let k = best.0.clamp(1, places - 2);
-                let [l, c, r] = [k - 1, k, k + 1].map(|k| matches[k].amplitude.abs());
-                let curvature = l - 2.0 * c + r;
-                let part = if curvature < -1e-9 { (0.5 * (l - r) / curvature).clamp(-0.6, 0.6) } else { 0.0 };
-                let q = (k as f32 - steps as f32 + part) * STEP_PX as f32;
-                let [bow, s_bend] = crate::adjust::graph::bend(profiles.along[bin]);
-                let bent = bow * graph.edges[e].bow[0] + s_bend * graph.edges[e].bow[1];
-                self.offsets.push(q + bent as f32);
+                let part = vertex([k - 1, k, k + 1].map(|k| row[k] * sign));
+                let q = (k as f32 - self.steps as f32 + part) * step;
+                self.offsets.push(q + bent);
+                let good = best.1 > 0.0 && self.profiles.inside[e * bins + bin] && (q - believed).abs() < 0.98 * reach;
+                let amplitude = row[best.0].abs();
+                self.picked.push((best.0, if good { amplitude } else { f32::NAN }));
+                // The squared sum that the template leaves, for now.
+                let rest = if good {
+                    let at = best.0 + self.profiles.half - self.steps;
+                    let found = self.kernels.match_at(kernel, self.profiles.row(e, bin), at);
+                    ((found.rest - found.gain).max(1e-6) * step / REST_PX).sqrt()
+                } else {
+                    f32::NAN
+                };
+                self.weights.push(rest);
             }
         }
+        self.weigh(graph);
     }
 
     /// How much each bin is believed: amplitude over what the template leaves, nothing where the amplitude is not the neighbours'.
-    fn weigh(&mut self, graph: &mut Graph, profiles: &Profiles) {
-        let bins = profiles.bins;
-        let places = self.matches.len() / (graph.edges.len() * bins).max(1);
-        let found = |k: usize| self.matches[k * places + self.picked[k].0];
-        self.scratch.clear();
-        self.scratch.extend((0..self.picked.len()).map(|k| found(k).amplitude.abs()));
-        let overall = median(&mut self.scratch).unwrap_or(0.0);
-        self.weights.clear();
-        for k in 0..self.picked.len() {
-            let m = found(k);
-            let steps = (places - 1) / 2;
-            let q = (self.picked[k].0 as f64 - steps as f64) * STEP_PX;
-            let good = profiles.inside[k] && self.picked[k].1 > 0.0 && q.abs() < 0.98 * self.reaches[k / bins];
-            let noise = ((m.rest - m.gain).max(1e-6) / 5.0).sqrt().max(0.15 * overall + 1e-6);
-            self.weights.push(if good { (m.amplitude / noise).powi(2).min(WEIGHT_MAX) } else { 0.0 });
-        }
+    fn weigh(&mut self, graph: &mut Graph) {
+        let bins = self.profiles.bins;
         self.amplitudes.clear();
         for e in 0..graph.edges.len() {
             self.scratch.clear();
-            let of_edge = e * bins..(e + 1) * bins;
-            self.scratch.extend(of_edge.filter(|&k| self.weights[k] > 0.0).map(|k| found(k).amplitude.abs()));
+            let of_edge = self.picked[e * bins..(e + 1) * bins].iter().map(|p| p.1);
+            self.scratch.extend(of_edge.filter(|a| !a.is_nan()));
             self.amplitudes.push(median(&mut self.scratch).unwrap_or(f32::NAN));
         }
-        graph.local_median(&self.amplitudes, AMPLITUDE_RADIUS, &mut self.typical);
-        for k in 0..self.weights.len() {
-            let part = self.matches[k * places + self.picked[k].0].amplitude.abs() / self.typical[k / bins];
-            if !(part > AMPLITUDE_PARTS.0 && part < AMPLITUDE_PARTS.1) {
-                self.weights[k] = 0.0;
-            }
+        graph.blocks.local_median(&self.amplitudes, &mut self.typical);
+        self.scratch.clear();
+        self.scratch.extend(self.amplitudes.iter().filter(|a| !a.is_nan()));
+        let least = LEAST_NOISE * upper(&mut self.scratch).unwrap_or(0.0) + 1e-6;
+        for (k, weight) in self.weights.iter_mut().enumerate() {
+            let amplitude = self.picked[k].1;
+            let part = amplitude / self.typical[graph.blocks.of_edge(k / bins)];
+            // False for NaN.
+            let alike = part > AMPLITUDE_PARTS.0 && part < AMPLITUDE_PARTS.1;
+            *weight = if alike { (amplitude / weight.max(least)).powi(2).min(WEIGHT_MAX) } else { 0.0 };
         }
     }
+}
+
+/// Matched filter for a twine.
+pub(crate) fn kernel_for(kernels: &mut Kernels, graph: &Graph, edge: usize, look: &Look) -> Kernel {
+    let Edge { nodes, family, .. } = graph.edges[edge];
+    let [a, b] = nodes.map(|n| &graph.nodes[n as usize]);
+    let width = (0.5 * look.twine_m * (a.scale + b.scale)).max(0.15);
+    let half = look.window_px(width, a.spacing[family].min(b.spacing[family]), family);
+    kernels.get(width, look.spread_px, look.blur_px[family], (half / kernels.step_px()).round() as usize)
+}
+
+/// How far a twine is looked for, px.
+pub(crate) fn reach_px(graph: &Graph, edge: usize, search_cells: f64) -> f32 {
+    let edge = &graph.edges[edge];
+    let [a, b] = edge.nodes.map(|n| graph.nodes[n as usize].spacing[edge.family]);
+    (search_cells * a.min(b)).clamp(SEARCH_PX.0, SEARCH_PX.1) as f32
+}
+
+/// Sign of the strongest line in reach (in steps), of amplitudes at every offset. Weights fall slowly: beside a twine the filter answers
+/// with the other sign, a third as strong, and a twine that is farther off than predicted must still outdo that.
+pub(crate) fn sign(amplitudes: &[f32], reach: f32) -> f32 {
+    let middle = (amplitudes.len() / 2) as f32;
+    let weighted = amplitudes.iter().enumerate().map(|(k, a)| {
+        let q = k as f32 - middle;
+        if q.abs() > reach { 0.0 } else { a * (-0.5 * (q / (reach + 0.5)).powi(2)).exp() }
+    });
+    let strongest = weighted.fold(0.0_f32, |best, s| if s.abs() > best.abs() { s } else { best });
+    if strongest < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Where three successive positive values have their maximum, in steps from the middle: that of a bell through them, or of a parabola.
+pub(crate) fn vertex([l, c, r]: [f32; 3]) -> f32 {
+    let least = 0.05 * c;
+    let [l, c, r] = if l > least && r > least { [l.ln(), c.ln(), r.ln()] } else { [l, c, r] };
+    let curvature = l - 2.0 * c + r;
+    if curvature < -1e-9 { (0.5 * (l - r) / curvature).clamp(-0.6, 0.6) } else { 0.0 }
 }

@@ -12,6 +12,11 @@ pub trait LatticeMap {
     /// Pixels per metre across the line of sight at `(i, j)`: focal length over depth. It gives twine its width.
     fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64>;
 
+    /// Both at once, for maps to which that comes cheaper.
+    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
+        Some((self.pixel(i, j)?, self.pixels_per_metre(i, j)?))
+    }
+
     /// A node that lies in the picture if any does, best in its middle.
     fn seed(&self) -> Option<(i32, i32)>;
 }

@@ -1,11 +1,14 @@
 //! Junctions by adjusting a predicted lattice to the picture: a small bundle adjustment in the image plane.
 
 mod adjuster;
+mod blocks;
 mod config;
 mod connect;
 mod graph;
+mod grow;
 mod locate;
 mod map;
+mod outside;
 mod presence;
 mod profile;
 mod solve;

@@ -4,18 +4,20 @@ use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::{Graph, median};
-use crate::adjust::profile::{Profiles, STEP_PX};
+use crate::adjust::graph::{Graph, median, upper};
+use crate::adjust::outside::Outside;
+use crate::adjust::profile::{FINE_PX, Profiles, Source};
 
-/// Cells to each side over which twines are compared with each other, and meshes with meshes.
-const RADIUS: i32 = 3;
-const CELL_RADIUS: i32 = 4;
 /// Steps that a profile may be shifted to fit its neighbours' mean: 1 px.
 const SHIFT: usize = 2;
 /// Part of the twine, from its middle to its ends, that is free of knots.
-const MIDDLE: (f64, f64) = (0.12, 0.88);
+const MIDDLE: (f32, f32) = (0.12, 0.88);
 /// Least scatter of relative amplitudes, of twines and of control lines.
 const SCATTER_MIN: (f32, f32) = (0.06, 0.07);
+/// Part of the next block's typical amplitude below which a block is no measure: at a net's end and in holes most twines are gone.
+const TYPICAL_LEAST: f32 = 0.6;
+/// Energy of a template, in parts of strong ones', below which there is no net: in clean pictures anything stands out from nothing.
+const LEAST_ENERGY: f32 = 0.004;
 /// A mesh whose level or spread is this many deviations off its surroundings' is covered by something.
 const HIDDEN: f32 = 4.0;
 /// Part of a template's extreme that it must reach on the line.
@@ -57,164 +59,180 @@ pub struct Twine {
 /// Buffers of this stage, and what it found for each edge.
 #[derive(Debug, Default)]
 pub(crate) struct Presence {
+    control_profiles: Profiles,
     means: Vec<f32>,
     valid: Vec<bool>,
+    /// By block.
     templates: Vec<f32>,
     centred: Vec<bool>,
     amplitudes: Vec<f32>,
     row: Vec<f32>,
     twine: Lines,
     control: Lines,
-    typical: Vec<f32>,
-    spread: Vec<f32>,
-    control_typical: Vec<f32>,
-    control_spread: Vec<f32>,
+    control_structure: Vec<f32>,
     deviations: Vec<f32>,
     levels: Vec<f32>,
     textures: Vec<f32>,
+    typical: Vec<f32>,
     covered: Vec<f32>,
+    outside: Outside,
     /// The twines, in the graph's order.
     pub twines: Vec<Twine>,
 }
 
-/// Per edge: smallest mean relative amplitude over half of it, and structure there.
+/// Per edge: amplitude over the whole of it, the smallest over half of it, and structure there.
 #[derive(Debug, Default)]
 struct Lines {
-    weakest: Vec<f32>,
+    whole: Statistic,
+    weakest: Statistic,
     structure: Vec<f32>,
 }
 
 impl Presence {
     /// Judges every twine.
     ///
-    /// `half` is the template's length on each side, `beside` how far its extreme may lie off the line, both in steps.
+    /// `half` is the template's length on each side, `beside` how far its extreme may lie off the line, both in steps. `profiles` are
+    /// those of the twines.
     pub fn judge(
         &mut self,
         graph: &mut Graph,
-        profiles: &mut Profiles,
+        profiles: &Profiles,
+        source: &Source,
         image: GrayView,
         half: usize,
         beside: usize,
         config: &AdjustConfig,
     ) {
-        profiles.sample(graph, half + SHIFT, false, 1);
+        let half = half.min(profiles.half.saturating_sub(SHIFT)).max(1);
         self.mean_profiles(profiles, half);
         self.learn(graph, half, false);
         let mut twine = std::mem::take(&mut self.twine);
-        self.reduce(profiles, half, &mut twine);
+        self.reduce(graph, profiles, half, &mut twine);
         // Once more without what looks absent.
         self.learn(graph, half, true);
-        self.reduce(profiles, half, &mut twine);
-        profiles.sample(graph, half + SHIFT, true, 1);
+        self.reduce(graph, profiles, half, &mut twine);
+        let mut control_profiles = std::mem::take(&mut self.control_profiles);
+        control_profiles.sample(source, graph, (half + SHIFT, FINE_PX), true, 1, Some(profiles.bins));
         let mut control = std::mem::take(&mut self.control);
-        self.reduce(profiles, half, &mut control);
-        (self.twine, self.control) = (twine, control);
+        self.reduce(graph, &control_profiles, half, &mut control);
+        (self.twine, self.control, self.control_profiles) = (twine, control, control_profiles);
         self.centre(half, beside);
         self.find_covered(graph, image);
         self.decide(graph, config);
+        self.outside.mark(graph, &mut self.twines);
     }
 
-    /// Mean profile of each twine, free of constant and slope.
+    /// Mean profile of each twine's middle, free of constant and slope.
     fn mean_profiles(&mut self, profiles: &Profiles, half: usize) {
         let (edges, width) = (profiles.inside.len() / profiles.bins, 2 * half + 1);
+        let bins = middle_bins(profiles);
+        let count = bins.len();
         self.means.clear();
+        self.means.resize(edges * width, 0.0);
         self.valid.clear();
-        for e in 0..edges {
-            self.row.clear();
-            self.row.resize(width, 0.0);
-            let (mut count, mut inside) = (0, 0);
-            for bin in middle_bins(profiles) {
-                count += 1;
+        for (e, row) in self.means.chunks_exact_mut(width).enumerate() {
+            let mut inside = 0;
+            for bin in bins.clone() {
                 inside += usize::from(profiles.inside[e * profiles.bins + bin]);
-                let part = &profiles.row(e, bin)[SHIFT..SHIFT + width];
-                self.row.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+                row.iter_mut().zip(part(profiles, e, bin, half, SHIFT)).for_each(|(s, p)| *s += p);
             }
-            self.row.iter_mut().for_each(|s| *s /= count as f32);
-            remove_line(&mut self.row);
-            self.means.extend_from_slice(&self.row);
+            row.iter_mut().for_each(|s| *s /= count as f32);
+            remove_line(row);
             self.valid.push(4 * inside > 3 * count);
         }
     }
 
-    /// Template of each twine: the mean of its neighbours' profiles; with `known` only of those that look like twine.
+    /// Template of each block: the mean of the profiles around; with `known` only of those that look like twine.
     fn learn(&mut self, graph: &Graph, half: usize, known: bool) {
         let width = 2 * half + 1;
         self.templates.clear();
-        for e in 0..graph.edges.len() {
-            self.row.clear();
-            self.row.resize(width, 0.0);
+        self.templates.resize(graph.blocks.count() * width, 0.0);
+        for (block, template) in self.templates.chunks_exact_mut(width).enumerate() {
+            if graph.blocks.members(block).is_empty() {
+                continue;
+            }
             let mut count = 0.0_f32;
-            graph.for_neighbours(e, RADIUS, |n| {
-                if self.valid[n] && (!known || (0.4..2.5).contains(&self.amplitudes[n])) {
-                    let mean = &self.means[n * width..][..width];
-                    self.row.iter_mut().zip(mean).for_each(|(s, m)| *s += m);
+            for &e in graph.blocks.around(block).into_iter().flatten() {
+                let e = e as usize;
+                if self.valid[e] && (!known || (0.4..2.5).contains(&self.amplitudes[e])) {
+                    template.iter_mut().zip(&self.means[e * width..][..width]).for_each(|(s, m)| *s += m);
                     count += 1.0;
                 }
-            });
-            self.templates.extend(self.row.iter().map(|s| s / count.max(1.0)));
+            }
+            template.iter_mut().for_each(|s| *s /= count.max(1.0));
         }
     }
 
     /// Amplitude of each line in parts of its template's, at the best common shift.
-    fn reduce(&mut self, profiles: &Profiles, half: usize, lines: &mut Lines) {
+    fn reduce(&mut self, graph: &Graph, profiles: &Profiles, half: usize, lines: &mut Lines) {
         let width = 2 * half + 1;
         let edges = self.valid.len();
-        lines.weakest.clear();
+        lines.whole.values.clear();
+        lines.weakest.values.clear();
         lines.structure.clear();
-        self.amplitudes.clear();
         let bins = middle_bins(profiles);
-        let count = bins.clone().count();
+        let (first, count) = (bins.start, bins.len());
         let window = count.div_ceil(2).max(1);
         for e in 0..edges {
-            let template = &self.templates[e * width..][..width];
-            let energy: f32 = template.iter().map(|t| t * t).sum::<f32>() + 1e-9;
             let inside = bins.clone().filter(|b| profiles.inside[e * profiles.bins + b]).count();
             if 4 * inside <= 3 * count {
-                lines.weakest.push(f32::NAN);
+                lines.whole.values.push(f32::NAN);
+                lines.weakest.values.push(f32::NAN);
                 lines.structure.push(f32::NAN);
-                self.amplitudes.push(f32::NAN);
                 continue;
             }
-            let relative = |bin: usize, shift: usize| {
-                let part = &profiles.row(e, bin)[shift..shift + width];
-                part.iter().zip(template).map(|(p, t)| p * t).sum::<f32>() / energy
+            let template = &self.templates[graph.blocks.of_edge(e) * width..][..width];
+            let energy: f32 = template.iter().map(|t| t * t).sum::<f32>() + 1e-9;
+            let dot = |bin: usize, shift: usize| {
+                part(profiles, e, bin, half, shift).iter().zip(template).map(|(p, t)| p * t).sum::<f32>() / energy
             };
-            let mean = |shift: usize| bins.clone().map(|b| relative(b, shift)).sum::<f32>() / count as f32;
-            let (shift, amplitude) =
-                (0..=2 * SHIFT).map(|s| (s, mean(s))).fold((SHIFT, f32::MIN), |a, b| if b.1 > a.1 { b } else { a });
-            self.amplitudes.push(amplitude);
+            let mut best = (SHIFT, f32::MIN);
+            for shift in 0..=2 * SHIFT {
+                let mean = bins.clone().map(|b| dot(b, shift)).sum::<f32>() / count as f32;
+                if mean > best.1 {
+                    best = (shift, mean);
+                }
+            }
+            lines.whole.values.push(best.1);
+            self.row.clear();
+            self.row.extend(bins.clone().map(|b| dot(b, best.0)));
             // The weakest half: a broken twine leaves stubs.
             let mut weakest = (f32::MAX, 0);
-            let first = bins.start;
-            for start in 0..=count - window {
-                let sum: f32 = (start..start + window).map(|b| relative(first + b, shift)).sum();
+            for (start, part) in self.row.windows(window).enumerate() {
+                let sum: f32 = part.iter().sum();
                 if sum < weakest.0 {
                     weakest = (sum, start);
                 }
             }
-            lines.weakest.push(weakest.0 / window as f32);
+            lines.weakest.values.push(weakest.0 / window as f32);
             let structure: f32 = (weakest.1..weakest.1 + window)
                 .map(|b| {
                     self.row.clear();
-                    self.row.extend_from_slice(&profiles.row(e, first + b)[SHIFT..SHIFT + width]);
+                    self.row.extend_from_slice(part(profiles, e, first + b, half, SHIFT));
                     remove_line(&mut self.row);
                     (self.row.iter().map(|r| r * r).sum::<f32>() / width as f32).sqrt()
                 })
                 .sum();
             lines.structure.push(structure / window as f32);
         }
+        self.amplitudes.clone_from(&lines.whole.values);
     }
 
     /// Learned templates fit whatever neighbours have in common, also twine beside the line: its extreme must lie on the line.
     fn centre(&mut self, half: usize, beside: usize) {
         self.centred.clear();
+        let energy = |template: &[f32]| template.iter().map(|t| t * t).sum::<f32>();
+        self.row.clear();
+        self.row.extend(self.templates.chunks_exact(2 * half + 1).map(energy).filter(|&e| e > 0.0));
+        let least = LEAST_ENERGY * upper(&mut self.row).unwrap_or(0.0);
         for template in self.templates.chunks_exact(2 * half + 1) {
             let smooth = |k: usize| template[k - 1] + 2.0 * template[k] + template[k + 1];
             let extreme =
                 (1..2 * half).map(smooth).fold(0.0_f32, |most, t| if t.abs() > most.abs() { t } else { most });
             let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
             // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
-            self.centred.push(near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme));
+            let on_line = near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme);
+            self.centred.push(on_line && energy(template) > least);
         }
     }
 
@@ -236,66 +254,83 @@ impl Presence {
         self.covered.clear();
         self.covered.resize(graph.edges.len(), 0.0);
         for (values, floor, signed) in [(&self.levels, 0.3, false), (&self.textures, 0.1, true)] {
-            graph.local_median(values, CELL_RADIUS, &mut self.typical);
+            graph.blocks.local_median(values, &mut self.typical);
+            let off = |e: usize| values[e] - self.typical[graph.blocks.of_edge(e)];
             self.deviations.clear();
-            let pairs = || values.iter().zip(&self.typical).map(|(v, t)| v - t);
-            self.deviations.extend(pairs().filter(|d| !d.is_nan()).map(f32::abs));
+            self.deviations.extend((0..values.len()).map(off).filter(|d| !d.is_nan()).map(f32::abs));
             let scale = 1.4826 * median(&mut self.deviations).unwrap_or(0.0) + floor;
-            for (covered, d) in self.covered.iter_mut().zip(pairs()) {
-                let off = if signed { d } else { d.abs() } / scale;
+            for (e, covered) in self.covered.iter_mut().enumerate() {
+                let off = if signed { off(e) } else { off(e).abs() } / scale;
                 *covered = covered.max(off);
             }
         }
     }
 
     fn decide(&mut self, graph: &mut Graph, config: &AdjustConfig) {
-        location_and_scatter(
-            graph,
-            &self.twine.weakest,
-            SCATTER_MIN.0,
-            &mut self.deviations,
-            &mut self.typical,
-            &mut self.spread,
-        );
-        location_and_scatter(
-            graph,
-            &self.control.weakest,
-            SCATTER_MIN.1,
-            &mut self.deviations,
-            &mut self.control_typical,
-            &mut self.control_spread,
-        );
-        graph.local_median(&self.control.structure, RADIUS, &mut self.deviations);
+        for e in (0..graph.edges.len()).filter(|&e| !self.centred[graph.blocks.of_edge(e)]) {
+            (self.twine.whole.values[e], self.twine.weakest.values[e]) = (f32::NAN, f32::NAN);
+        }
+        for (lines, floor) in [(&mut self.twine, SCATTER_MIN.0), (&mut self.control, SCATTER_MIN.1)] {
+            lines.whole.summarise(graph, floor, &mut self.deviations);
+            lines.weakest.summarise(graph, floor, &mut self.deviations);
+        }
+        // Twice: at a net's corner the blocks beside are themselves at its end.
+        for _ in 0..2 {
+            self.twine.whole.borrow(graph, &mut self.deviations);
+            self.twine.weakest.borrow(graph, &mut self.deviations);
+        }
+        graph.blocks.local_median(&self.control.structure, &mut self.control_structure);
         self.twines.clear();
         for (e, edge) in graph.edges.iter().enumerate() {
             let index = graph.nodes[edge.nodes[0] as usize].index;
-            let (p0, sp) = (self.typical[e], self.spread[e]);
-            let (m0, s0) = (self.control_typical[e], self.control_spread[e]);
-            let w = self.twine.weakest[e];
-            // Stronger than usual twine is no less twine; weaker than no twine is no less missing.
-            let x = w.min(p0).max(m0);
-            let llr = log_student(x, p0, sp) - log_student(x, m0, s0);
-            let contrast = (p0 - m0) / sp.hypot(s0);
+            let block = graph.blocks.of_edge(e);
+            let (weak_llr, contrast) = evidence(&self.twine.weakest, &self.control.weakest, e, block);
+            let (whole_llr, whole_contrast) = evidence(&self.twine.whole, &self.control.whole, e, block);
             let beside = if edge.family == 0 { (index.0, index.1 - 1) } else { (index.0 - 1, index.1) };
-            let covered = [index, beside]
-                .into_iter()
-                .filter_map(|i| graph.edge_from(graph.node_at(i)?, 0))
-                .map(|k| self.covered[k])
-                .fold(0.0, f32::max);
-            let clutter = self.twine.structure[e] / (self.deviations[e] + 1e-6);
-            let told = !w.is_nan() && f64::from(contrast) > config.gate && self.centred[e];
+            let of_cells = |cells: &[(i32, i32)]| {
+                let edges = cells.iter().filter_map(|&c| graph.edge_from(graph.node_at(c)?, 0));
+                edges.map(|k| self.covered[k]).fold(0.0, f32::max)
+            };
+            let covered = of_cells(&[index, beside]);
+            let (i, j) = index;
+            let touching = if edge.family == 0 {
+                [(i - 1, j), (i - 1, j - 1), (i + 1, j), (i + 1, j - 1)]
+            } else {
+                [(i, j - 1), (i - 1, j - 1), (i, j + 1), (i - 1, j + 1)]
+            };
+            let near = of_cells(&touching).max(covered);
+            let clutter = self.twine.structure[e] / (self.control_structure[block] + 1e-6);
+            let known = !self.twine.weakest.values[e].is_nan() && self.centred[block];
+            let told = known && f64::from(contrast) > config.gate;
+            let told_whole = known && f64::from(whole_contrast) > config.gate;
+            // Half of a twine shows a break, the whole of it that it is there.
+            let llr = if told && f64::from(weak_llr) < config.missing_llr || !told_whole {
+                weak_llr
+            } else {
+                weak_llr.max(whole_llr)
+            };
+            let llr = if known { llr } else { 0.0 };
             let state = match f64::from(llr) {
-                l if told && l > config.present_llr => TwineState::Present,
+                l if (told || told_whole) && l > config.present_llr => TwineState::Present,
                 l if l > 0.0 && told && covered <= HIDDEN => TwineState::Unknown,
                 _ if !told && covered <= HIDDEN => TwineState::Unknown,
                 _ if covered > HIDDEN => TwineState::Hidden,
                 l if l < config.missing_llr && clutter > CLUTTER => TwineState::Fouled,
+                // What hides a mesh may hide a twine at its corner.
+                l if l < config.missing_llr && near > HIDDEN => TwineState::Hidden,
                 l if l < config.missing_llr => TwineState::Missing,
                 _ => TwineState::Unknown,
             };
+            // None for what is outside the picture.
+            let contrast = if self.valid[e] { contrast.max(whole_contrast) } else { 0.0 };
             self.twines.push(Twine { index, direction: edge.family, state, llr, contrast });
         }
     }
+}
+
+/// A bin's profile over the template's length, from `shift` steps on; [`SHIFT`] is the line itself.
+fn part(profiles: &Profiles, edge: usize, bin: usize, half: usize, shift: usize) -> &[f32] {
+    &profiles.row(edge, bin)[profiles.half - half - SHIFT + shift..][..2 * half + 1]
 }
 
 /// Bins in the middle part of the twine, or all if there are few.
@@ -326,25 +361,53 @@ fn remove_line(values: &mut [f32]) {
     }
 }
 
-/// Local median, and scatter about it half local, half over the picture.
-fn location_and_scatter(
-    graph: &mut Graph,
-    values: &[f32],
-    floor: f32,
-    deviations: &mut Vec<f32>,
-    typical: &mut Vec<f32>,
-    spread: &mut Vec<f32>,
-) {
-    graph.local_median(values, RADIUS, typical);
-    deviations.clear();
-    deviations.extend(values.iter().zip(typical.iter()).map(|(v, t)| (v - t).abs()));
-    graph.local_median(deviations, RADIUS, spread);
-    deviations.retain(|d| !d.is_nan());
-    let overall = median(deviations).unwrap_or(0.0);
-    for s in spread.iter_mut() {
-        *s = 1.4826 * (0.5 * (*s * *s + overall * overall)).sqrt();
-        *s = s.hypot(floor);
+/// A statistic of all lines, and by block its median and scatter.
+#[derive(Debug, Default)]
+struct Statistic {
+    values: Vec<f32>,
+    typical: Vec<f32>,
+    spread: Vec<f32>,
+}
+
+impl Statistic {
+    /// Local medians, and scatter about them half local, half over the picture.
+    fn summarise(&mut self, graph: &mut Graph, floor: f32, deviations: &mut Vec<f32>) {
+        graph.blocks.local_median(&self.values, &mut self.typical);
+        deviations.clear();
+        let blocks = &graph.blocks;
+        deviations.extend(self.values.iter().enumerate().map(|(e, v)| (v - self.typical[blocks.of_edge(e)]).abs()));
+        graph.blocks.local_median(deviations, &mut self.spread);
+        deviations.retain(|d| !d.is_nan());
+        let overall = median(deviations).unwrap_or(0.0);
+        for s in &mut self.spread {
+            *s = (1.4826 * (0.5 * (*s * *s + overall * overall)).sqrt()).hypot(floor);
+        }
     }
+}
+
+impl Statistic {
+    /// Blocks where most twines are gone take over what the best of their neighbours has.
+    fn borrow(&mut self, graph: &Graph, typical: &mut Vec<f32>) {
+        typical.clone_from(&self.typical);
+        for block in 0..typical.len() {
+            let around = graph.blocks.beside(block).into_iter().flatten();
+            let around = around.filter(|&b| !graph.blocks.members(b).is_empty());
+            let Some(best) = around.max_by(|&a, &b| typical[a].total_cmp(&typical[b])) else { continue };
+            if typical[block] < TYPICAL_LEAST * typical[best] {
+                self.typical[block] = typical[best];
+                self.spread[block] = self.spread[block].min(self.spread[best]);
+            }
+        }
+    }
+}
+
+/// Log likelihood ratio, twine to no twine, of an edge's statistic, and by how many standard deviations its neighbourhood's differ.
+fn evidence(twine: &Statistic, control: &Statistic, edge: usize, block: usize) -> (f32, f32) {
+    let (p0, sp) = (twine.typical[block], twine.spread[block]);
+    let (m0, s0) = (control.typical[block], control.spread[block]);
+    // Stronger than usual twine is no less twine; weaker than no twine is no less missing.
+    let x = twine.values[edge].min(p0).max(m0);
+    (log_student(x, p0, sp) - log_student(x, m0, s0), (p0 - m0) / sp.hypot(s0))
 }
 
 /// Logarithm of Student's density with five degrees of freedom, up to a constant.
@@ -375,10 +438,4 @@ fn mesh_level(image: GrayView, middle: Vector2<f64>, radius: f64) -> (f32, f32) 
     }
     let mean = sum / 9.0;
     (mean, (squares / 9.0 - mean * mean).max(0.0).sqrt())
-}
-
-/// Steps of the template on each side, for twine of this width in cells of this height, px.
-pub(crate) fn template_half(height: f64, width: f64, sigma: f64) -> usize {
-    let half = (0.3 * height).max(2.0).min(0.8 * width + 3.0 * sigma + 1.5);
-    (half / STEP_PX).round() as usize
 }

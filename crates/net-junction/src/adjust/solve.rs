@@ -1,166 +1,223 @@
 //! Sparse least squares on node displacements and twine bows.
 //!
 //! A twine's bins see only the displacement of its ends across it, `n·x_a` and `n·x_b`, and its two bends. Bends are eliminated twine by
-//! twine; what remains couples neighbouring nodes and is solved by conjugate gradients with 2 x 2 diagonal blocks.
+//! twine; what remains couples neighbouring nodes and is solved by conjugate gradients with 2 x 2 diagonal blocks, each round from
+//! the last one's solution.
 
 use net_geometry::nalgebra::{Matrix2, Vector2};
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, bend, median};
 
+type V2 = Vector2<f32>;
+type M2 = Matrix2<f32>;
+
 /// Most weight of a bin; amplitudes five times their noise and more count alike.
 pub(crate) const WEIGHT_MAX: f32 = 25.0;
-/// Weight that the strongest answer in reach has where there is nothing but noise: three times the noise, squared.
-const WEIGHT_OF_NOISE: f32 = 9.0;
-/// Rounds of robust reweighting.
-const ROUNDS: usize = 5;
+/// Weight below which a bin says nothing of the scale of residuals: twine no stronger than noise.
+const WEIGHT_MIN: f32 = 1.0;
 /// Scale of residuals below which they are not believed, px.
-const RESIDUAL_MIN_PX: f64 = 0.05;
+const RESIDUAL_MIN_PX: f32 = 0.05;
+/// Scale of residuals before the first round, px.
+const RESIDUAL_START_PX: f32 = 0.15;
 /// Constant part of the standard deviation of neighbours' different displacements, px.
 const JITTER_MIN_PX: f64 = 0.1;
 /// Constant part of the standard deviation of bows, px.
-const BOW_MIN_PX: f64 = 0.05;
+const BOW_MIN_PX: f32 = 0.05;
 /// Standard deviation of a node's displacement in this pass, cells.
 const SHIFT_CELLS: f64 = 0.25;
-/// Conjugate-gradient steps, at most, and the part of the residual at which they end.
-const STEPS_MAX: usize = 60;
-const STEPS_END: f64 = 1e-4;
+/// Conjugate-gradient steps of a round, at most, and the part of the right side at which they end.
+const STEPS_MAX: usize = 24;
+const STEPS_END: f32 = 2e-3;
+/// Residuals of which the scale is the median.
+const SCALE_SAMPLE: usize = 2000;
+
+/// Products of a bin's coefficients that the normal equations are sums of.
+const MOMENTS: usize = 16;
 
 /// Normal equations of one twine, bends eliminated: for the displacements of its ends along `normal`.
 #[derive(Debug, Clone, Copy, Default)]
 struct Twine {
-    normal: Vector2<f64>,
-    system: Matrix2<f64>,
+    normal: V2,
+    system: M2,
     /// Weight of the difference between its ends' total displacements.
-    coherence: f64,
+    coherence: f32,
     /// Bends are `bend_right - bend_by_end * (s_a, s_b)`.
-    bend_right: Vector2<f64>,
-    bend_by_end: Matrix2<f64>,
+    bend_right: V2,
+    bend_by_end: M2,
+}
+
+/// What does not change from round to round.
+#[derive(Debug, Clone, Copy, Default)]
+struct Frame {
+    normal: V2,
+    coherence: f32,
+    /// Inverse variance of the bow.
+    bow: f32,
+    /// Difference of the ends' displacements so far.
+    different: V2,
 }
 
 /// Buffers of this stage.
 #[derive(Debug, Default)]
 pub(crate) struct Solver {
     twines: Vec<Twine>,
+    frames: Vec<Frame>,
+    /// By bin: products of coefficients.
+    moments: Vec<[f32; MOMENTS]>,
+    /// By bin: coefficients of both ends and both bends.
+    coefficients: Vec<[f32; 4]>,
     weights: Vec<f32>,
-    residuals: Vec<f32>,
     magnitudes: Vec<f32>,
-    step: Vec<Vector2<f64>>,
-    right: Vec<Vector2<f64>>,
-    inverse: Vec<Matrix2<f64>>,
-    residual: Vec<Vector2<f64>>,
-    scaled: Vec<Vector2<f64>>,
-    direction: Vec<Vector2<f64>>,
-    product: Vec<Vector2<f64>>,
+    /// Inverse variance of nodes' displacements.
+    prior: Vec<f32>,
+    /// Displacements since the last [`Solver::commit`].
+    step: Vec<V2>,
+    right: Vec<V2>,
+    inverse: Vec<M2>,
+    residual: Vec<V2>,
+    scaled: Vec<V2>,
+    direction: Vec<V2>,
+    product: Vec<V2>,
     /// Information on each node from its twines' bins alone, px⁻².
-    pub information: Vec<Matrix2<f64>>,
+    pub information: Vec<M2>,
     /// Scale of the residuals, px.
-    pub scale: f64,
+    scale: f32,
 }
 
 impl Solver {
-    /// Moves nodes and bends twines towards the measured `offsets` (px across the chord, for each edge and bin) of the given
-    /// `weights` (0 to [`WEIGHT_MAX`]). `along` are the bins' places on the twine.
-    pub fn solve(&mut self, graph: &mut Graph, along: &[f64], offsets: &[f32], weights: &[f32], config: &AdjustConfig) {
+    /// Takes nodes and twines where they are now believed to be as the place from which displacements count.
+    pub fn start(&mut self, graph: &Graph, along: &[f32], config: &AdjustConfig) {
+        self.step.clear();
+        self.step.resize(graph.nodes.len(), V2::zeros());
+        self.prior.clear();
+        self.prior.extend(graph.nodes.iter().map(|n| (SHIFT_CELLS * n.height).powi(-2) as f32));
+        self.frames.clear();
+        self.frames.extend(graph.edges.iter().map(|edge| {
+            let [a, b] = edge.nodes.map(|n| &graph.nodes[n as usize]);
+            let chord = (b.pixel() - a.pixel()).cast::<f32>();
+            let length = chord.norm();
+            let height = a.height.min(b.height);
+            Frame {
+                normal: V2::new(-chord.y, chord.x) / length,
+                coherence: (config.jitter_cells * height + JITTER_MIN_PX).powi(-2) as f32,
+                bow: (config.bow as f32 * length + BOW_MIN_PX).powi(-2),
+                different: (b.shift - a.shift).cast(),
+            }
+        }));
+        self.coefficients.clear();
+        self.coefficients.extend(along.iter().map(|&at| {
+            let [bow, s_bend] = bend(at);
+            [1.0 - at, at, bow, s_bend]
+        }));
+        self.moments.clear();
+        self.moments.extend(self.coefficients.iter().map(|c| {
+            let mut products = [0.0; MOMENTS];
+            let pairs = [(0, 0), (0, 1), (1, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
+            for (p, (a, b)) in products.iter_mut().zip(pairs) {
+                *p = c[a] * c[b];
+            }
+            products
+        }));
+        self.scale = RESIDUAL_START_PX;
+    }
+
+    /// Fits displacements and bends to the measured `offsets` (px across the chord, for each edge and bin) of the given
+    /// `weights` (0 to [`WEIGHT_MAX`]), reweighting them `rounds` times.
+    pub fn solve(&mut self, graph: &Graph, offsets: &[f32], weights: &[f32], rounds: usize) {
         self.weights.clear();
         self.weights.extend_from_slice(weights);
-        self.scale = 0.15;
-        for _ in 0..ROUNDS {
-            self.assemble(graph, along, offsets, config);
+        for round in 0..rounds {
+            self.assemble(graph, offsets);
             self.conjugate_gradients(graph);
-            self.reweigh(graph, along, offsets, weights);
-        }
-        for (e, twine) in self.twines.iter().enumerate() {
-            let bow = twine.bends(self.ends(graph, e));
-            graph.edges[e].bow = [bow.x, bow.y];
-        }
-        for (node, step) in graph.nodes.iter_mut().zip(&self.step) {
-            node.shift += step;
+            if round + 1 < rounds {
+                self.reweigh(graph, offsets, weights);
+            }
         }
     }
 
-    /// Sum of the bins' weights after the last reweighting, as far as they exceed what noise reaches: how much twine fits.
-    pub fn weight(&self) -> f32 {
-        self.weights.iter().map(|w| (w - WEIGHT_OF_NOISE).max(0.0)).sum()
+    /// Moves nodes and bends twines as was found.
+    pub fn commit(&mut self, graph: &mut Graph) {
+        for e in 0..self.twines.len() {
+            let bends = self.twines[e].bends(self.ends(graph, e));
+            graph.edges[e].bow = [bends.x, bends.y];
+        }
+        for (node, step) in graph.nodes.iter_mut().zip(&self.step) {
+            node.shift += step.cast::<f64>();
+        }
+    }
+
+    /// How far, px, the twine now lies off its chord as it was at the start, at `along` from 0 to 1.
+    pub fn offset(&self, graph: &Graph, edge: usize, along: f32) -> f32 {
+        let ends = self.ends(graph, edge);
+        let bends = self.twines[edge].bends(ends);
+        let [bow, s_bend] = bend(along);
+        ends.x * (1.0 - along) + ends.y * along + bow * bends.x + s_bend * bends.y
     }
 
     /// Displacement of a twine's ends across it.
-    fn ends(&self, graph: &Graph, edge: usize) -> Vector2<f64> {
+    fn ends(&self, graph: &Graph, edge: usize) -> V2 {
         let [a, b] = graph.edges[edge].nodes.map(|n| self.step[n as usize]);
-        let normal = self.twines[edge].normal;
-        Vector2::new(normal.dot(&a), normal.dot(&b))
+        let normal = self.frames[edge].normal;
+        V2::new(normal.dot(&a), normal.dot(&b))
     }
 
-    fn assemble(&mut self, graph: &Graph, along: &[f64], offsets: &[f32], config: &AdjustConfig) {
+    fn assemble(&mut self, graph: &Graph, offsets: &[f32]) {
         let nodes = graph.nodes.len();
         self.twines.clear();
-        self.step.clear();
-        self.step.resize(nodes, Vector2::zeros());
         self.right.clear();
-        self.right.resize(nodes, Vector2::zeros());
+        self.right.resize(nodes, V2::zeros());
         self.inverse.clear();
-        self.inverse.extend(graph.nodes.iter().map(|n| Matrix2::identity() / (SHIFT_CELLS * n.height).powi(2)));
+        self.inverse.extend(self.prior.iter().map(|&p| M2::identity() * p));
         self.information.clear();
-        self.information.resize(nodes, Matrix2::zeros());
+        self.information.resize(nodes, M2::zeros());
         let floor = (1.5 * self.scale).max(RESIDUAL_MIN_PX);
-        let unit = 1.0 / (f64::from(WEIGHT_MAX) * floor * floor);
-        for (e, edge) in graph.edges.iter().enumerate() {
-            let [a, b] = edge.nodes.map(|n| &graph.nodes[n as usize]);
-            let chord = b.pixel() - a.pixel();
-            let length = chord.norm();
-            let normal = Vector2::new(-chord.y, chord.x) / length;
-            let bow_sigma = config.bow * length + BOW_MIN_PX;
-            let mut bends = Matrix2::new(bow_sigma.powi(-2), 0.0, 0.0, (0.5 * bow_sigma).powi(-2));
-            let (mut ends, mut cross) = (Matrix2::zeros(), Matrix2::zeros());
-            let (mut right_ends, mut right_bends) = (Vector2::zeros(), Vector2::zeros());
-            for (bin, &at) in along.iter().enumerate() {
-                let weight = f64::from(self.weights[e * along.len() + bin]) * unit;
-                if weight > 0.0 {
-                    let (end, bow) = (Vector2::new(1.0 - at, at), Vector2::from(bend(at)));
-                    let offset = f64::from(offsets[e * along.len() + bin]);
-                    ends += end * end.transpose() * weight;
-                    cross += bow * end.transpose() * weight;
-                    bends += bow * bow.transpose() * weight;
-                    right_ends += end * (weight * offset);
-                    right_bends += bow * (weight * offset);
-                }
+        let unit = 1.0 / (WEIGHT_MAX * floor * floor);
+        let bins = self.moments.len();
+        for (e, (edge, frame)) in graph.edges.iter().zip(&self.frames).enumerate() {
+            let mut m = [0.0_f32; MOMENTS];
+            let mut r = [0.0_f32; 4];
+            for (bin, (moments, coefficients)) in self.moments.iter().zip(&self.coefficients).enumerate() {
+                let weight = self.weights[e * bins + bin] * unit;
+                let pull = weight * offsets[e * bins + bin];
+                m.iter_mut().zip(moments).for_each(|(m, p)| *m += weight * p);
+                r.iter_mut().zip(coefficients).for_each(|(r, c)| *r += pull * c);
             }
+            let ends = M2::new(m[0], m[1], m[1], m[2]);
+            // Rows: bends; columns: ends.
+            let cross = M2::new(m[3], m[5], m[4], m[6]);
+            let (b00, b01, b11) = (m[7] + frame.bow, m[8], m[9] + 4.0 * frame.bow);
             // The prior makes it positive definite.
-            let inverse = bends.try_inverse().unwrap_or_else(Matrix2::zeros);
-            let system = ends - cross.transpose() * inverse * cross;
-            let right = right_ends - cross.transpose() * inverse * right_bends;
-            let height = a.height.min(b.height);
-            let coherence = (config.jitter_cells * height + JITTER_MIN_PX).powi(-2);
-            self.twines.push(Twine {
-                normal,
-                system,
-                coherence,
-                bend_right: inverse * right_bends,
-                bend_by_end: inverse * cross,
-            });
-            let different = b.shift - a.shift;
+            let inverse = M2::new(b11, -b01, -b01, b00) / (b00 * b11 - b01 * b01);
+            let bend_by_end = inverse * cross;
+            let bend_right = inverse * V2::new(r[2], r[3]);
+            let system = ends - cross.tr_mul(&bend_by_end);
+            let right = V2::new(r[0], r[1]) - cross.tr_mul(&bend_right);
+            let Frame { normal, coherence, different, .. } = *frame;
+            self.twines.push(Twine { normal, system, coherence, bend_right, bend_by_end });
             let outer = normal * normal.transpose();
             for (k, node) in edge.nodes.into_iter().enumerate() {
                 let (node, sign) = (node as usize, if k == 0 { 1.0 } else { -1.0 });
                 self.right[node] += normal * right[k] + different * (sign * coherence);
-                self.information[node] += outer * system[(k, k)];
-                self.inverse[node] += outer * system[(k, k)] + Matrix2::identity() * coherence;
+                let known = outer * system[(k, k)];
+                self.information[node] += known;
+                self.inverse[node] += known + M2::identity() * coherence;
             }
         }
         for block in &mut self.inverse {
-            *block = block.try_inverse().unwrap_or_else(Matrix2::zeros);
+            *block = block.try_inverse().unwrap_or_else(M2::zeros);
         }
     }
 
     /// `product = A direction`.
     fn multiply(&mut self, graph: &Graph) {
-        for ((p, d), node) in self.product.iter_mut().zip(&self.direction).zip(&graph.nodes) {
-            *p = d / (SHIFT_CELLS * node.height).powi(2);
+        for ((p, d), prior) in self.product.iter_mut().zip(&self.direction).zip(&self.prior) {
+            *p = d * *prior;
         }
         for (edge, twine) in graph.edges.iter().zip(&self.twines) {
             let [a, b] = edge.nodes.map(|n| n as usize);
             let (da, db) = (self.direction[a], self.direction[b]);
-            let pull = twine.system * Vector2::new(twine.normal.dot(&da), twine.normal.dot(&db));
+            let pull = twine.system * V2::new(twine.normal.dot(&da), twine.normal.dot(&db));
             let apart = (da - db) * twine.coherence;
             self.product[a] += twine.normal * pull.x + apart;
             self.product[b] += twine.normal * pull.y - apart;
@@ -169,18 +226,23 @@ impl Solver {
 
     fn conjugate_gradients(&mut self, graph: &Graph) {
         let nodes = graph.nodes.len();
-        let precondition = |inverse: &[Matrix2<f64>], from: &[Vector2<f64>], to: &mut Vec<Vector2<f64>>| {
+        let dot = |a: &[V2], b: &[V2]| a.iter().zip(b).map(|(x, y)| x.dot(y)).sum::<f32>();
+        let precondition = |inverse: &[M2], from: &[V2], to: &mut Vec<V2>| {
             to.clear();
             to.extend(inverse.iter().zip(from).map(|(m, r)| m * r));
         };
-        let dot = |a: &[Vector2<f64>], b: &[Vector2<f64>]| a.iter().zip(b).map(|(x, y)| x.dot(y)).sum::<f64>();
-        self.residual.clone_from(&self.right);
+        self.product.clear();
+        self.product.resize(nodes, V2::zeros());
+        precondition(&self.inverse, &self.right, &mut self.scaled);
+        let end = dot(&self.right, &self.scaled) * STEPS_END * STEPS_END;
+        // From where the last round ended.
+        self.direction.clone_from(&self.step);
+        self.multiply(graph);
+        self.residual.clear();
+        self.residual.extend(self.right.iter().zip(&self.product).map(|(r, p)| r - p));
         precondition(&self.inverse, &self.residual, &mut self.scaled);
         self.direction.clone_from(&self.scaled);
-        self.product.clear();
-        self.product.resize(nodes, Vector2::zeros());
         let mut squared = dot(&self.residual, &self.scaled);
-        let end = squared * STEPS_END * STEPS_END;
         for _ in 0..STEPS_MAX {
             if squared <= end || squared.is_nan() {
                 break;
@@ -201,29 +263,32 @@ impl Solver {
         }
     }
 
-    fn reweigh(&mut self, graph: &Graph, along: &[f64], offsets: &[f32], weights: &[f32]) {
-        self.residuals.clear();
-        for (e, twine) in self.twines.iter().enumerate() {
+    fn reweigh(&mut self, graph: &Graph, offsets: &[f32], weights: &[f32]) {
+        let bins = self.coefficients.len();
+        // Weights hold the residuals for a moment.
+        for e in 0..self.twines.len() {
             let ends = self.ends(graph, e);
-            let bends = twine.bends(ends);
-            for (bin, &at) in along.iter().enumerate() {
-                let [bow, s_bend] = bend(at);
-                let predicted = ends.x * (1.0 - at) + ends.y * at + bow * bends.x + s_bend * bends.y;
-                self.residuals.push(offsets[e * along.len() + bin] - predicted as f32);
+            let bends = self.twines[e].bends(ends);
+            let [x, y, bow, s_bend] = [ends.x, ends.y, bends.x, bends.y];
+            let of_edge = e * bins..(e + 1) * bins;
+            for ((w, o), c) in self.weights[of_edge.clone()].iter_mut().zip(&offsets[of_edge]).zip(&self.coefficients) {
+                *w = o - (c[0] * x + c[1] * y + c[2] * bow + c[3] * s_bend);
             }
         }
         self.magnitudes.clear();
-        self.magnitudes.extend(self.residuals.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(r, _)| r.abs()));
-        self.scale = f64::from(1.4826 * median(&mut self.magnitudes).unwrap_or(0.0)).max(0.06);
-        let softness = (2.5 * self.scale) as f32;
-        for ((w, &w0), &r) in self.weights.iter_mut().zip(weights).zip(&self.residuals) {
-            *w = w0 / (1.0 + (r / softness).powi(2)).powi(2);
+        let stride = (weights.len() / SCALE_SAMPLE).max(1);
+        let known = self.weights.iter().zip(weights).step_by(stride).filter(|(_, w)| **w > WEIGHT_MIN);
+        self.magnitudes.extend(known.map(|(r, _)| r.abs()));
+        self.scale = (1.4826 * median(&mut self.magnitudes).unwrap_or(0.0)).max(0.06);
+        let softness = 1.0 / (2.5 * self.scale);
+        for (w, &w0) in self.weights.iter_mut().zip(weights) {
+            *w = w0 / (1.0 + (*w * softness).powi(2)).powi(2);
         }
     }
 }
 
 impl Twine {
-    fn bends(&self, ends: Vector2<f64>) -> Vector2<f64> {
+    fn bends(&self, ends: V2) -> V2 {
         self.bend_right - self.bend_by_end * ends
     }
 }

@@ -1,15 +1,34 @@
 //! Matched filter for twine across its direction.
 
-use crate::adjust::profile::STEP_PX;
-
 /// Ratio of widths of neighbouring classes is `e` to this.
 const CLASS: f64 = 0.15;
+
+/// How twine looks in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Look {
+    /// Diameter, m.
+    pub twine_m: f64,
+    /// Way of the picture across twines of each family while the shutter was open, px.
+    pub blur_px: [f64; 2],
+    /// Standard deviation of the point spread, px.
+    pub spread_px: f64,
+}
+
+impl Look {
+    /// Length of the template on each side, px, for twine of this width in cells of this height: wide enough for twine and blur, not for its
+    /// neighbours.
+    pub fn window_px(&self, width: f64, cell: f64, family: usize) -> f64 {
+        let blur = self.blur_px[family];
+        let room = (0.3 * cell + 0.25 * blur).min((0.5 * cell).max(0.3 * cell));
+        room.max(2.0).min(0.8 * width + 3.0 * self.spread_px + 1.5 + 0.5 * blur)
+    }
+}
 
 /// A twine's profile, freed of constant and slope, on `2 half + 1` steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Kernel {
-    /// Class of width, and steps on each side of its middle.
-    class: (i32, usize),
+    /// Class of width, motion blur in quarters of a pixel, and steps on each side of its middle.
+    class: (i32, i32, usize),
     start: usize,
     /// Sum of squares.
     energy: f32,
@@ -20,7 +39,7 @@ pub(crate) struct Kernel {
 impl Kernel {
     /// Steps on each side of the kernel's middle.
     pub fn half(&self) -> usize {
-        self.class.1
+        self.class.2
     }
 }
 
@@ -40,27 +59,40 @@ pub(crate) struct Match {
 pub(crate) struct Kernels {
     kernels: Vec<Kernel>,
     taps: Vec<f32>,
+    step_px: f64,
 }
 
 impl Kernels {
-    /// Forgets all kernels.
-    pub fn clear(&mut self) {
+    /// Forgets all kernels; new ones have steps of this size.
+    pub fn start(&mut self, step_px: f64) {
+        self.step_px = step_px;
         self.kernels.clear();
         self.taps.clear();
     }
 
-    /// The kernel for twine `width` px wide seen through a point spread of `sigma` px, on `half` steps to each side.
-    pub fn get(&mut self, width: f64, sigma: f64, half: usize) -> Kernel {
-        let class = ((width.max(1e-3).ln() / CLASS).round() as i32, half.max(2));
+    /// Distance between values, px.
+    pub fn step_px(&self) -> f64 {
+        self.step_px
+    }
+
+    /// The kernel for twine `width` px wide, blurred over `blur` px by motion and by a point spread of `sigma` px, on `half` steps to each side.
+    pub fn get(&mut self, width: f64, sigma: f64, blur: f64, half: usize) -> Kernel {
+        let class = ((width.max(1e-3).ln() / CLASS).round() as i32, (4.0 * blur).round() as i32, half.max(2));
         if let Some(kernel) = self.kernels.iter().find(|k| k.class == class) {
             return *kernel;
         }
-        let (width, half) = ((f64::from(class.0) * CLASS).exp(), class.1 as i32);
+        let (width, blur, half) = ((f64::from(class.0) * CLASS).exp(), 0.25 * f64::from(class.1), class.2 as i32);
         let edge = |x: f64| normal_cdf(x / sigma);
+        // Integral of `edge`.
+        let ramp = |x: f64| x * edge(x) + sigma * (-0.5 * (x / sigma).powi(2)).exp() / std::f64::consts::TAU.sqrt();
         let start = self.taps.len();
         let profile = |k: i32| {
-            let q = f64::from(k) * STEP_PX;
-            edge(q + 0.5 * width) - edge(q - 0.5 * width)
+            let q = f64::from(k) * self.step_px;
+            if blur < 0.5 {
+                return edge(q + 0.5 * width) - edge(q - 0.5 * width);
+            }
+            let (sum, difference) = (0.5 * (width + blur), 0.5 * (width - blur));
+            (ramp(q + sum) - ramp(q + difference) - ramp(q - difference) + ramp(q - sum)) / blur
         };
         // Even in k: free of slope already.
         let mean = (-half..=half).map(profile).sum::<f64>() / f64::from(2 * half + 1);
@@ -72,13 +104,32 @@ impl Kernels {
         kernel
     }
 
+    /// Amplitudes with the kernel's middle at each of `out.len()` successive values of a profile, the first at `first`.
+    #[inline]
+    pub fn amplitudes(&self, kernel: &Kernel, profile: &[f32], first: usize, out: &mut [f32]) {
+        let (half, count) = (kernel.half(), out.len());
+        let taps = &self.taps[kernel.start..][..2 * half + 1];
+        let middle = taps[half] / kernel.energy;
+        for (o, p) in out.iter_mut().zip(&profile[first..first + count]) {
+            *o = middle * p;
+        }
+        // Even: both sides at once.
+        for k in 1..=half {
+            let tap = taps[half - k] / kernel.energy;
+            let (before, after) = (&profile[first - k..][..count], &profile[first + k..][..count]);
+            for ((o, a), b) in out.iter_mut().zip(before).zip(after) {
+                *o += tap * (a + b);
+            }
+        }
+    }
+
     /// Matches the kernel with its middle at value `at` of the profile, which must hold it whole.
     #[inline]
     pub fn match_at(&self, kernel: &Kernel, profile: &[f32], at: usize) -> Match {
         let half = kernel.half();
         let taps = &self.taps[kernel.start..][..2 * half + 1];
         let part = &profile[at - half..][..2 * half + 1];
-        // About the first value, so that squares of large grey levels do not cancel.
+        // About the middle value, so that squares of large grey levels do not cancel.
         let base = part[half];
         let (mut product, mut sum, mut squares, mut slope) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
         let mut distance = -(half as f32);
@@ -111,29 +162,56 @@ mod tests {
     #[test]
     fn amplitude_is_found_whatever_the_background_does() {
         let mut kernels = Kernels::default();
-        let kernel = kernels.get(1.5, 0.75, 8);
+        kernels.start(1.0);
+        let kernel = kernels.get(1.5, 0.75, 0.0, 5);
         let width = (f64::from(kernel.class.0) * CLASS).exp();
-        let profile: Vec<f32> = (-20..=20)
+        let profile: Vec<f32> = (-12..=12)
             .map(|k| {
-                let q = f64::from(k) * STEP_PX;
+                let q = f64::from(k);
                 let twine = normal_cdf((q + 0.5 * width) / 0.75) - normal_cdf((q - 0.5 * width) / 0.75);
                 (120.0 + 3.0 * q - 40.0 * twine) as f32
             })
             .collect();
-        let found = kernels.match_at(&kernel, &profile, 20);
+        let found = kernels.match_at(&kernel, &profile, 12);
         // Single precision of grey levels.
         assert!((found.amplitude + 40.0).abs() < 1e-2, "{found:?}");
         assert!((found.gain / found.rest - 1.0).abs() < 1e-3, "{found:?}");
-        // Three steps aside it explains less.
-        assert!(kernels.match_at(&kernel, &profile, 23).gain < 0.8 * found.gain);
+        // Two steps aside it explains less.
+        assert!(kernels.match_at(&kernel, &profile, 14).gain < 0.8 * found.gain);
+        let mut all = [0.0; 15];
+        kernels.amplitudes(&kernel, &profile, 5, &mut all);
+        for (k, amplitude) in all.into_iter().enumerate() {
+            assert!((amplitude - kernels.match_at(&kernel, &profile, 5 + k).amplitude).abs() < 1e-2, "{k}");
+        }
+    }
+
+    #[test]
+    fn motion_is_a_mean_of_places() {
+        let (mut kernels, half) = (Kernels::default(), 12);
+        kernels.start(0.5);
+        let kernel = kernels.get(1.0, 0.75, 6.0, half);
+        let taps = &kernels.taps[kernel.start..][..2 * half + 1];
+        let sharp = |q: f64| normal_cdf((q + 0.5) / 0.75) - normal_cdf((q - 0.5) / 0.75);
+        let places = |k: i32| {
+            let at = |n: i32| 0.5 * f64::from(k) + 6.0 * (f64::from(n) + 0.5) / 200.0 - 3.0;
+            (0..200).map(|n| sharp(at(n))).sum::<f64>() / 200.0
+        };
+        let half = half as i32;
+        let mean = (-half..=half).map(places).sum::<f64>() / f64::from(2 * half + 1);
+        for k in -half..=half {
+            // The normal distribution is good to 1e-7, the mean of 200 places to their distance squared.
+            let expected = places(k) - mean;
+            assert!((f64::from(taps[(k + half) as usize]) - expected).abs() < 1e-4, "{k}");
+        }
     }
 
     #[test]
     fn kernels_are_made_once() {
         let mut kernels = Kernels::default();
-        let a = kernels.get(2.0, 0.75, 6);
-        assert_eq!(kernels.get(2.01, 0.75, 6), a);
-        assert_ne!(kernels.get(4.0, 0.75, 6), a);
+        kernels.start(1.0);
+        let a = kernels.get(2.0, 0.75, 0.0, 6);
+        assert_eq!(kernels.get(2.01, 0.75, 0.0, 6), a);
+        assert_ne!(kernels.get(4.0, 0.75, 0.0, 6), a);
         assert_eq!(kernels.kernels.len(), 2);
     }
 }

@@ -1,26 +1,26 @@
 //! What the prediction misses smoothly, and growth outward from where it is right.
 //!
-//! A bent net leaves its tangent plane with the square of the distance from the axis. So the lattice is adjusted near the seed first; a polynomial
-//! through the displacements found there corrects the prediction a little farther out, and so on to the picture's corners.
+//! A bent net leaves its tangent plane with the square of the distance from the axis. So twine is measured near the seed first; a polynomial
+//! through the offsets found there corrects the prediction a little farther out, and so on to the picture's corners. Some hundreds of twines
+//! are enough.
 
 use net_geometry::nalgebra::{SMatrix, SVector, Vector2};
 
-use crate::adjust::graph::Graph;
-use crate::adjust::map::LatticeMap;
-use crate::adjust::solve::Solver;
-
-/// Terms of two variables up to the fourth degree.
-const TERMS: usize = 15;
+/// Terms of two variables up to the third degree.
+const TERMS: usize = 10;
+const UNKNOWNS: usize = 2 * TERMS;
 /// How many of them there are up to each degree.
-const TERMS_TO_DEGREE: [usize; 5] = [1, 3, 6, 10, 15];
+const TERMS_TO_DEGREE: [usize; 4] = [1, 3, 6, 10];
 /// Distance from the seed that counts as one, px.
 const UNIT_PX: f64 = 500.0;
 /// Standard deviation of coefficients of each degree, px at one unit: nets bend, and what bends more than once bends less.
-const SIGMA_BY_DEGREE_PX: [f64; 5] = [50.0, 100.0, 150.0, 60.0, 30.0];
-/// Standard deviation of a node about the polynomial: cells and px.
-const NODE_SIGMA: (f64, f64) = (0.03, 0.2);
-/// Least information, px⁻², of a node that takes part.
-const INFORMATION_MIN: f64 = 1.0;
+const SIGMA_BY_DEGREE_PX: [f64; 4] = [50.0, 100.0, 150.0, 60.0];
+/// Standard deviation of a twine about the polynomial: cells and px.
+const TWINE_SIGMA: (f64, f64) = (0.03, 0.2);
+/// Rounds of robust reweighting.
+const ROUNDS: usize = 4;
+/// Most twines in a fit.
+const FIT_TWINES: usize = 400;
 
 /// First radius of growth, px, at least and in cells, and the factor from one to the next.
 const FIRST_RADIUS: (f64, f64) = (60.0, 5.0);
@@ -30,91 +30,83 @@ const GROWTH: f64 = 1.4;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Warp {
     origin: Vector2<f64>,
-    coefficients: SMatrix<f64, TERMS, 2>,
+    coefficients: SVector<f64, UNKNOWNS>,
+}
+
+/// A measured twine: at `from` as predicted without a warp the net lies `across` px off along `normal`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Measured {
+    pub from: Vector2<f64>,
+    pub normal: Vector2<f64>,
+    pub across: f64,
+    /// Distance of twines here, px.
+    pub cell: f64,
+}
+
+fn terms(d: Vector2<f64>) -> SVector<f64, TERMS> {
+    let (x, y) = (d.x, d.y);
+    let (xx, xy, yy) = (x * x, x * y, y * y);
+    SVector::from([1.0, x, y, xx, xy, yy, xx * x, xx * y, x * yy, yy * y])
 }
 
 impl Warp {
     /// No displacement.
     pub fn none(origin: Vector2<f64>) -> Self {
-        Self { origin, coefficients: SMatrix::zeros() }
+        Self { origin, coefficients: SVector::zeros() }
     }
 
     fn terms(&self, p: Vector2<f64>) -> SVector<f64, TERMS> {
-        let d = (p - self.origin) / UNIT_PX;
-        let (x, y) = (d.x, d.y);
-        let (xx, xy, yy) = (x * x, x * y, y * y);
-        SVector::from([
-            1.0,
-            x,
-            y,
-            xx,
-            xy,
-            yy,
-            xx * x,
-            xx * y,
-            x * yy,
-            yy * y,
-            xx * xx,
-            xx * xy,
-            xx * yy,
-            xy * yy,
-            yy * yy,
-        ])
+        terms((p - self.origin) / UNIT_PX)
     }
 
     /// Displacement, px, at a predicted pixel.
     pub fn at(&self, p: Vector2<f64>) -> Vector2<f64> {
-        self.coefficients.tr_mul(&self.terms(p))
+        let terms = self.terms(p);
+        let (x, y) = (self.coefficients.fixed_rows::<TERMS>(0), self.coefficients.fixed_rows::<TERMS>(TERMS));
+        Vector2::new(x.dot(&terms), y.dot(&terms))
     }
 
-    /// Robust fit, of at most this degree (1 to 4), to where the graph's nodes were found. Stays as it is where nothing can be fitted.
-    pub fn fit(&mut self, graph: &Graph, solver: &Solver, map: &impl LatticeMap, degree: usize) {
-        let count = TERMS_TO_DEGREE[degree.min(4)];
-        for round in 0..4 {
-            let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
-            let mut right = SMatrix::<f64, TERMS, 2>::zeros();
-            for k in 0..TERMS {
-                // Terms of higher degrees are held at zero.
-                let of_degree = TERMS_TO_DEGREE.iter().position(|&n| k < n).unwrap_or(0);
-                normal[(k, k)] = if k < count { SIGMA_BY_DEGREE_PX[of_degree].powi(-2) } else { 1e6 };
-            }
-            for (node, information) in graph.nodes.iter().zip(&solver.information) {
-                let (i, j) = node.index;
-                let Some(from) = map.pixel(f64::from(i), f64::from(j)) else { continue };
-                let known = information.determinant().max(0.0).sqrt();
-                if known < INFORMATION_MIN {
-                    continue;
-                }
-                let moved = node.pixel() - from;
-                let sigma = NODE_SIGMA.0 * node.height + NODE_SIGMA.1;
-                let off = if round == 0 { 0.0 } else { (moved - self.at(from)).norm() };
+    /// Robust fit, of at most this degree (1 to 3). Stays as it is where nothing can be fitted.
+    pub fn fit(&mut self, twines: &[Measured], degree: usize) {
+        let count = TERMS_TO_DEGREE[degree.min(3)];
+        // Odd: both families in turn.
+        let stride = twines.len().div_ceil(FIT_TWINES) | 1;
+        for round in 0..ROUNDS {
+            let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+            let mut right = SVector::<f64, UNKNOWNS>::zeros();
+            for twine in twines.iter().step_by(stride) {
+                let sigma = TWINE_SIGMA.0 * twine.cell + TWINE_SIGMA.1;
+                let off = if round == 0 { 0.0 } else { twine.across - twine.normal.dot(&self.at(twine.from)) };
                 let weight = sigma.powi(-2) / (1.0 + (off / (2.5 * sigma)).powi(2)).powi(2);
-                let terms = self.terms(from);
-                normal += terms * terms.transpose() * weight;
-                right += terms * moved.transpose() * weight;
+                let terms = self.terms(twine.from);
+                let (nx, ny) = (twine.normal.x, twine.normal.y);
+                for r in 0..count {
+                    let part = terms[r] * weight;
+                    right[r] += nx * twine.across * part;
+                    right[TERMS + r] += ny * twine.across * part;
+                    for c in 0..count {
+                        let product = part * terms[c];
+                        normal[(r, TERMS + c)] += nx * ny * product;
+                        if c <= r {
+                            normal[(r, c)] += nx * nx * product;
+                            normal[(TERMS + r, TERMS + c)] += ny * ny * product;
+                        }
+                    }
+                }
+            }
+            for r in 0..UNKNOWNS {
+                for c in r + 1..UNKNOWNS {
+                    let value = if r < TERMS && c >= TERMS { normal[(r, c)] } else { normal[(c, r)] };
+                    (normal[(r, c)], normal[(c, r)]) = (value, value);
+                }
+                // Terms of higher degrees are held at zero.
+                let term = r % TERMS;
+                let of_degree = TERMS_TO_DEGREE.iter().position(|&n| term < n).unwrap_or(0);
+                normal[(r, r)] += if term < count { SIGMA_BY_DEGREE_PX[of_degree].powi(-2) } else { 1e6 };
             }
             let Some(solver) = normal.cholesky() else { return };
             self.coefficients = solver.solve(&right);
         }
-    }
-}
-
-/// A prediction with its correction.
-pub(crate) struct Warped<'a, M> {
-    pub map: &'a M,
-    pub warp: &'a Warp,
-}
-
-impl<M: LatticeMap> LatticeMap for Warped<'_, M> {
-    fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
-        let p = self.map.pixel(i, j)?;
-        Some(p + self.warp.at(p))
-    }
-    fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
-        self.map.pixels_per_metre(i, j)
-    }
-    fn seed(&self) -> Option<(i32, i32)> {
-        self.map.seed()
     }
 }
 

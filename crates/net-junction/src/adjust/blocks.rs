@@ -1,0 +1,111 @@
+//! Neighbourhoods of twines: blocks of 3 x 3 cells that share what is learnt from 9 x 9.
+
+use crate::adjust::graph::{Edge, Node, median};
+
+/// Cells along a block's side.
+const SIDE: i32 = 3;
+
+/// Edges by family and block; keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct Blocks {
+    first: (i32, i32),
+    columns: usize,
+    rows: usize,
+    of_edge: Vec<u32>,
+    /// Where each block's members begin; one more than there are blocks.
+    starts: Vec<u32>,
+    members: Vec<u32>,
+    next: Vec<u32>,
+    scratch: Vec<f32>,
+}
+
+impl Blocks {
+    /// Sorts edges into blocks by their first nodes.
+    pub fn build(&mut self, nodes: &[Node], edges: &[Edge]) {
+        let indices = || nodes.iter().map(|n| n.index);
+        self.first = indices().fold((i32::MAX, i32::MAX), |a, b| (a.0.min(b.0), a.1.min(b.1)));
+        let last = indices().fold((i32::MIN, i32::MIN), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+        let count = |first: i32, last: i32| if last < first { 0 } else { ((last - first) / SIDE) as usize + 1 };
+        (self.columns, self.rows) = (count(self.first.0, last.0), count(self.first.1, last.1));
+        self.of_edge.clear();
+        self.of_edge.extend(edges.iter().map(|e| {
+            let (i, j) = nodes[e.nodes[0] as usize].index;
+            let (column, row) = ((i - self.first.0) / SIDE, (j - self.first.1) / SIDE);
+            ((e.family * self.columns + column as usize) * self.rows + row as usize) as u32
+        }));
+        self.starts.clear();
+        self.starts.resize(self.count() + 1, 0);
+        for &block in &self.of_edge {
+            self.starts[block as usize + 1] += 1;
+        }
+        for k in 1..self.starts.len() {
+            self.starts[k] += self.starts[k - 1];
+        }
+        self.next.clone_from(&self.starts);
+        self.members.clear();
+        self.members.resize(edges.len(), 0);
+        for (e, &block) in self.of_edge.iter().enumerate() {
+            self.members[self.next[block as usize] as usize] = e as u32;
+            self.next[block as usize] += 1;
+        }
+    }
+
+    /// Number of blocks of both families.
+    pub fn count(&self) -> usize {
+        2 * self.columns * self.rows
+    }
+
+    /// The block of an edge.
+    pub fn of_edge(&self, edge: usize) -> usize {
+        self.of_edge[edge] as usize
+    }
+
+    /// Edges of a block.
+    pub fn members(&self, block: usize) -> &[u32] {
+        &self.members[self.starts[block] as usize..self.starts[block + 1] as usize]
+    }
+
+    /// Edges of the same family in a block and those around it: three runs of members.
+    pub fn around(&self, block: usize) -> [&[u32]; 3] {
+        let (row, column) = (block % self.rows, block / self.rows % self.columns);
+        let family = block / (self.rows * self.columns);
+        let (low, high) = (row.saturating_sub(1), (row + 1).min(self.rows - 1));
+        [-1_isize, 0, 1].map(|d| match column.checked_add_signed(d).filter(|&c| c < self.columns) {
+            Some(column) => {
+                let line = (family * self.columns + column) * self.rows;
+                &self.members[self.starts[line + low] as usize..self.starts[line + high + 1] as usize]
+            }
+            None => &[],
+        })
+    }
+
+    /// The four blocks of the same family beside a block.
+    pub fn beside(&self, block: usize) -> [Option<usize>; 4] {
+        let (row, column) = (block % self.rows, block / self.rows % self.columns);
+        [
+            (row > 0).then(|| block - 1),
+            (row + 1 < self.rows).then_some(block + 1),
+            (column > 0).then(|| block - self.rows),
+            (column + 1 < self.columns).then_some(block + self.rows),
+        ]
+    }
+
+    /// Median of edges' values around each block into `out` (cleared first); NaN does not count, and blocks without any value get
+    /// the overall median, or 0 if there is none. Empty blocks too.
+    pub fn local_median(&mut self, values: &[f32], out: &mut Vec<f32>) {
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.clear();
+        scratch.extend(values.iter().filter(|v| !v.is_nan()));
+        let overall = median(&mut scratch).unwrap_or(0.0);
+        out.clear();
+        for block in 0..self.count() {
+            scratch.clear();
+            if !self.members(block).is_empty() {
+                let near = self.around(block).into_iter().flatten().map(|&e| values[e as usize]);
+                scratch.extend(near.filter(|v| !v.is_nan()));
+            }
+            out.push(median(&mut scratch).unwrap_or(overall));
+        }
+        self.scratch = scratch;
+    }
+}

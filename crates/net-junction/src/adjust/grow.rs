@@ -1,0 +1,238 @@
+//! Growth outward from where the prediction is right: measures some hundreds of twines, ring by ring, and bends the prediction to them.
+
+use net_geometry::nalgebra::Vector2;
+
+use crate::adjust::config::AdjustConfig;
+use crate::adjust::graph::{Graph, median};
+use crate::adjust::locate::{kernel_for, reach_px, sign, vertex};
+use crate::adjust::map::LatticeMap;
+use crate::adjust::profile::{COARSE_PX, Source};
+use crate::adjust::template::{Kernels, Look};
+use crate::adjust::warp::{Measured, Warp, radii};
+
+/// Most twines that are measured.
+const TWINES: usize = 1500;
+/// Amplitudes outside these parts of the typical one are something else than twine.
+const AMPLITUDE_PARTS: (f32, f32) = (0.35, 3.0);
+/// A twine this near to where it was predicted, cells, speaks for the prediction.
+const NEAR_CELLS: f64 = 0.12;
+/// By how much more twines must speak for a warp than for none: one that leads astray finds twine, too, if a neighbouring one.
+const BETTER: f64 = 1.15;
+/// Where no twine would move farther than this, cells, there is nothing to compare.
+const SMALL_CELLS: f64 = 0.1;
+
+/// A twine on the list, and how it was sampled.
+#[derive(Debug, Clone, Copy)]
+struct Twine {
+    edge: u32,
+    /// Its middle as predicted without a warp, and the distance from the seed, px.
+    from: Vector2<f64>,
+    radius: f64,
+    /// Warp under which it was sampled, px across it, and the normal then; NaN until then.
+    warped: f64,
+    normal: Vector2<f64>,
+    reach: f32,
+}
+
+/// Buffers of this stage.
+#[derive(Debug, Default)]
+pub(crate) struct Grower {
+    kernels: Kernels,
+    twines: Vec<Twine>,
+    /// By twine: amplitudes at every offset.
+    responses: Vec<f32>,
+    /// Places of `responses`, for edges that are on the list.
+    row_of_edge: Vec<u32>,
+    profile: Vec<f32>,
+    sums: Vec<i32>,
+    sum: Vec<f32>,
+    strongest: Vec<f32>,
+    signs: Vec<f32>,
+    /// Offset, px, and amplitude of each sampled twine.
+    picked: Vec<(f64, f32)>,
+    measured: Vec<Measured>,
+}
+
+impl Grower {
+    /// The warp that takes the prediction to the net, or none where that fits no better.
+    pub fn grow(
+        &mut self,
+        source: &Source,
+        graph: &Graph,
+        seed: Vector2<f64>,
+        diagonal: f64,
+        look: &Look,
+        config: &AdjustConfig,
+    ) -> Warp {
+        let mut warp = Warp::none(seed);
+        let Some(cell) = graph.nodes.first().map(|n| n.height) else { return warp };
+        self.list(graph, seed, config);
+        let steps = self.steps();
+        for (round, radius) in radii(cell, diagonal).enumerate() {
+            for k in 0..self.twines.len() {
+                if self.twines[k].radius <= radius && self.twines[k].warped.is_nan() {
+                    self.sample(source, graph, k, steps, &warp, look);
+                }
+            }
+            self.pick(graph, steps);
+            warp.fit(&self.measured, 1 + round.div_ceil(2));
+        }
+        let moves = |t: &Twine| t.normal.dot(&warp.at(t.from)).abs() / cell_of(graph, t);
+        if self.twines.iter().filter(|t| !t.warped.is_nan()).any(|t| moves(t) > SMALL_CELLS) {
+            let none = Warp::none(seed);
+            let [without, with] = [&none, &warp].map(|w| {
+                for k in 0..self.twines.len() {
+                    self.sample(source, graph, k, steps, w, look);
+                }
+                self.pick(graph, steps);
+                let near = |m: &&Measured| (m.across - m.normal.dot(&w.at(m.from))).abs() < NEAR_CELLS * m.cell;
+                self.measured.iter().filter(near).count()
+            });
+            if (with as f64) < BETTER * without as f64 {
+                return none;
+            }
+        }
+        warp
+    }
+
+    fn list(&mut self, graph: &Graph, seed: Vector2<f64>, config: &AdjustConfig) {
+        // Odd: both families in turn.
+        let stride = graph.edges.len().div_ceil(TWINES) | 1;
+        self.kernels.start(COARSE_PX);
+        self.twines.clear();
+        self.row_of_edge.clear();
+        self.row_of_edge.resize(graph.edges.len(), u32::MAX);
+        for e in (0..graph.edges.len()).step_by(stride) {
+            let [a, b] = graph.edges[e].nodes.map(|n| &graph.nodes[n as usize]);
+            if a.inside && b.inside {
+                let from = (a.predicted + b.predicted) * 0.5;
+                self.row_of_edge[e] = self.twines.len() as u32;
+                self.twines.push(Twine {
+                    edge: e as u32,
+                    from,
+                    radius: (from - seed).norm(),
+                    warped: f64::NAN,
+                    normal: Vector2::zeros(),
+                    reach: reach_px(graph, e, config.search_cells[0]),
+                });
+            }
+        }
+    }
+
+    /// Offsets on each side.
+    fn steps(&mut self) -> usize {
+        let farthest = self.twines.iter().fold(0.0_f32, |most, t| most.max(t.reach));
+        let steps = (f64::from(farthest) / COARSE_PX).ceil() as usize + 1;
+        self.responses.clear();
+        self.responses.resize(self.twines.len() * (2 * steps + 1), 0.0);
+        steps
+    }
+
+    fn sample(&mut self, source: &Source, graph: &Graph, k: usize, steps: usize, warp: &Warp, look: &Look) {
+        let e = self.twines[k].edge as usize;
+        let kernel = kernel_for(&mut self.kernels, graph, e, look);
+        let ends = graph.edges[e].nodes.map(|n| graph.nodes[n as usize].predicted).map(|p| p + warp.at(p));
+        let chord = ends[1] - ends[0];
+        let normal = Vector2::new(-chord.y, chord.x) / chord.norm();
+        let half = steps + kernel.half();
+        self.profile.clear();
+        self.profile.resize(2 * half + 1, 0.0);
+        let mut inside = [true];
+        source.profiles(ends, [0.0; 2], COARSE_PX, &mut inside, &mut self.sums, &mut self.profile);
+        let places = 2 * steps + 1;
+        let out = &mut self.responses[k * places..][..places];
+        self.kernels.amplitudes(&kernel, &self.profile, half - steps, out);
+        if !inside[0] {
+            out.fill(0.0);
+        }
+        let twine = &mut self.twines[k];
+        (twine.normal, twine.warped) = (normal, normal.dot(&warp.at(twine.from)));
+    }
+
+    /// Where the sampled twines lie.
+    fn pick(&mut self, graph: &Graph, steps: usize) {
+        let places = 2 * steps + 1;
+        let Self { twines, responses, row_of_edge, sum, strongest, signs, picked, measured, .. } = self;
+        strongest.clear();
+        let most = |row: &[f32]| row.iter().fold(0.0_f32, |most, a| most.max(a.abs()));
+        let sampled = twines.iter().zip(responses.chunks_exact(places)).filter(|(t, _)| !t.warped.is_nan());
+        strongest.extend(sampled.map(|(_, row)| most(row)).filter(|&a| a > 0.0));
+        let limit = 1.5 * median(strongest).unwrap_or(0.0) + 1e-6;
+        signs.clear();
+        for block in 0..graph.blocks.count() {
+            sum.clear();
+            sum.resize(places, 0.0);
+            let mut reach = 0.0;
+            if !graph.blocks.members(block).is_empty() {
+                for &e in graph.blocks.around(block).into_iter().flatten() {
+                    let Some(t) = twines.get(row_of_edge[e as usize] as usize) else { continue };
+                    let row = &responses[row_of_edge[e as usize] as usize * places..][..places];
+                    sum.iter_mut().zip(row).for_each(|(s, a)| *s += a.clamp(-limit, limit));
+                    reach = t.reach;
+                }
+            }
+            signs.push(sign(sum, reach / COARSE_PX as f32));
+        }
+        picked.clear();
+        strongest.clear();
+        for (twine, row) in twines.iter().zip(responses.chunks_exact(places)) {
+            let sign = signs[graph.blocks.of_edge(twine.edge as usize)];
+            let mut best = (0, 0.0_f32);
+            for (k, a) in row.iter().enumerate() {
+                let q = (k as f32 - steps as f32) * COARSE_PX as f32;
+                let near = if q.abs() > twine.reach { 0.0 } else { 1.0 / (1.0 + (0.5 * q / twine.reach).powi(2)) };
+                if a * sign * near > best.1 {
+                    best = (k, a * sign * near);
+                }
+            }
+            let k = best.0.clamp(1, places - 2);
+            let q = (k as f32 - steps as f32 + vertex([k - 1, k, k + 1].map(|k| row[k] * sign))) * COARSE_PX as f32;
+            let good = !twine.warped.is_nan() && best.1 > 0.0 && q.abs() < 0.98 * twine.reach;
+            picked.push((f64::from(q), if good { row[best.0].abs() } else { 0.0 }));
+            if good {
+                strongest.push(row[best.0].abs());
+            }
+        }
+        let typical = median(strongest).unwrap_or(0.0);
+        measured.clear();
+        for (twine, &(q, amplitude)) in twines.iter().zip(picked.iter()) {
+            if amplitude > AMPLITUDE_PARTS.0 * typical && amplitude < AMPLITUDE_PARTS.1 * typical {
+                measured.push(Measured {
+                    from: twine.from,
+                    normal: twine.normal,
+                    across: twine.warped + q,
+                    cell: cell_of(graph, twine),
+                });
+            }
+        }
+    }
+}
+
+fn cell_of(graph: &Graph, twine: &Twine) -> f64 {
+    let edge = &graph.edges[twine.edge as usize];
+    let [a, b] = edge.nodes.map(|n| graph.nodes[n as usize].spacing[edge.family]);
+    a.min(b)
+}
+
+/// A prediction with its correction.
+pub(crate) struct Warped<'a, M> {
+    pub map: &'a M,
+    pub warp: &'a Warp,
+}
+
+impl<M: LatticeMap> LatticeMap for Warped<'_, M> {
+    fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
+        let p = self.map.pixel(i, j)?;
+        Some(p + self.warp.at(p))
+    }
+    fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
+        self.map.pixels_per_metre(i, j)
+    }
+    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
+        let (p, scale) = self.map.place(i, j)?;
+        Some((p + self.warp.at(p), scale))
+    }
+    fn seed(&self) -> Option<(i32, i32)> {
+        self.map.seed()
+    }
+}
