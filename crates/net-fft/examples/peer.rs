@@ -1,7 +1,7 @@
 //! Draws pictures, times the stages on them and finds their poses: the half in Rust of `benches/peer/thesis.py`, which does the same on OpenCV.
 //!
 //! `cargo run --release -p net-fft --example peer -- FOLDER` writes `NAME.pgm` and prints lines of comma-separated fields:
-//! `truth,NAME,range_m,nx,ny,nz`, `pose,NAME,METHOD,range_m,nx,ny,nz,probability` (empty without a net) and `time,NAME,STAGE,microseconds` (best of [`REPEATS`]).
+//! `truth,NAME,range_m,nx,ny,nz`, `pose,NAME,METHOD,range_m,nx,ny,nz,probability` (empty without a net) and `time,NAME,STAGE,microseconds` (mean over [`ENOUGH_SECONDS`] on a core).
 
 use std::error::Error;
 use std::path::Path;
@@ -15,8 +15,8 @@ use net_geometry::{Camera, Lens, Mesh};
 use net_image::{Image, View};
 use net_sim::{Layer, NetPose, Scene, Simulator};
 
-/// The best of so many: on a shared machine all others were disturbed.
-const REPEATS: usize = 15;
+/// Runs go on for so long, on a core.
+const ENOUGH_SECONDS: f64 = 0.1;
 /// Range, m, and tilts about x and y, degrees.
 const SCENES: [(f64, f64, f64); 12] = [
     (0.4, 0.0, 0.0),
@@ -33,12 +33,26 @@ const SCENES: [(f64, f64, f64); 12] = [
     (6.0, 0.0, -10.0),
 ];
 
-fn best<T>(mut stage: impl FnMut() -> T) -> f64 {
-    (0..REPEATS).fold(f64::INFINITY, |least, _| {
-        let start = Instant::now();
+/// Mean of many runs, microseconds of this thread's time on a core: the kernel counts it by ticks, so that one run shows nothing.
+fn mean_time<T>(mut stage: impl FnMut() -> T) -> f64 {
+    std::hint::black_box(stage());
+    let begin = Instant::now();
+    let (start, mut runs) = (cpu_seconds(begin), 0);
+    loop {
         std::hint::black_box(stage());
-        least.min(start.elapsed().as_secs_f64() * 1e6)
-    })
+        runs += 1;
+        let time = cpu_seconds(begin) - start;
+        if time > ENOUGH_SECONDS {
+            return time / f64::from(runs) * 1e6;
+        }
+    }
+}
+
+/// Time of this thread on a core, where the kernel tells (Linux); otherwise time since `begin`.
+fn cpu_seconds(begin: Instant) -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split(' ').next().and_then(|first| first.parse::<f64>().ok());
+    nanoseconds.map_or_else(|| begin.elapsed().as_secs_f64(), |nanoseconds| nanoseconds * 1e-9)
 }
 
 fn write_pgm(path: &Path, picture: &Image<u8>) -> std::io::Result<()> {
@@ -63,14 +77,14 @@ fn time_stages(name: &str, picture: View<'_, u8>) -> Result<(), Box<dyn Error>> 
     let numbers: Vec<f32> = picture.rows().flat_map(|row| row.iter().map(|&level| f32::from(level))).collect();
     let numbers = View::packed(&numbers, picture.width(), picture.height())?;
     let (mut fft, mut half) = (RealFft2::new(picture.width(), picture.height())?, HalfSpectrum::default());
-    time("real 2-D transform of the picture", best(|| fft.forward(numbers, &mut half)));
+    time("real 2-D transform of the picture", mean_time(|| fft.forward(numbers, &mut half)));
 
     let (width, height) = (picture.width() / 2, picture.height() / 2);
     let section = picture.crop(0, 0, width, height).ok_or("no section")?;
     let (mut plan, mut drawn) = (SpectrumPlan::new(width, height, Window::Hann)?, SpectrumImage::default());
     time(
         "spectrum of a section",
-        best(|| {
+        mean_time(|| {
             let done = plan.transform(section, &mut half);
             drawn.draw(&half, Bins::All, SpectrumImageConfig::default());
             done
@@ -78,10 +92,10 @@ fn time_stages(name: &str, picture: View<'_, u8>) -> Result<(), Box<dyn Error>> 
     );
     let config = SectionConfig::thesis(false);
     let (mut finder, view) = (PeakFinder::default(), drawn.view().ok_or("no spectrum")?);
-    time("peaks of a section", best(|| finder.find(view, drawn.constant_bin(), &config.peaks).len()));
+    time("peaks of a section", mean_time(|| finder.find(view, drawn.constant_bin(), &config.peaks).len()));
     let mut analyser = SectionAnalyser::new(width, height, &config)?;
     let mut spectrum = SectionSpectrum::default();
-    time("section to scored wave vectors", best(|| analyser.analyse(section, &mut spectrum)));
+    time("section to scored wave vectors", mean_time(|| analyser.analyse(section, &mut spectrum)));
     Ok(())
 }
 
@@ -103,8 +117,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("truth,{name},{},{},{},{}", axis.range_m, axis.normal.x, axis.normal.y, axis.normal.z);
         let view = picture.view().ok_or("no picture")?;
         time_stages(&name, view)?;
-        println!("time,{name},four sections to the plane,{}", best(|| thesis.estimate(view).is_ok()));
-        println!("time,{name},default: all sections together,{}", best(|| together.estimate(view).is_ok()));
+        println!("time,{name},four sections to the plane,{}", mean_time(|| thesis.estimate(view).is_ok()));
+        println!("time,{name},default: all sections together,{}", mean_time(|| together.estimate(view).is_ok()));
         print_pose(&name, "thesis", thesis.estimate(view)?.as_ref());
         print_pose(&name, "default", together.estimate(view)?.as_ref());
     }

@@ -19,7 +19,7 @@ use crate::naming::Naming;
 use crate::plane::{SideInSection, most_confident_three, plane_from_waves, pose_in_plane};
 use crate::polish::{Fitted, LAST_TOLERANCE_BINS, Polish};
 use crate::poses::{agreed_poses, own_poses};
-use crate::reduce::sum_of_four;
+use crate::reduce::{SUMS, mean_of_four, noise_factor, sum_of_four};
 use crate::search::{Hypothesis, Search, weakest_period};
 use crate::section::{SectionAnalyser, SectionConfig, SectionSpectrum};
 use crate::sections::SectionView;
@@ -64,8 +64,7 @@ impl ThesisEstimator {
                 return Err(Error::EmptySize { width, height });
             }
             let size = grid.section_size(width, height);
-            // Every halving doubles the noise: samples are sums of four.
-            let least_noise_grey = config.section.least_noise_grey * (1 << halvings) as f64;
+            let least_noise_grey = config.section.least_noise_grey * noise_factor(halvings);
             let section = SectionConfig { least_noise_grey, ..config.section };
             let analyser = SectionAnalyser::new(size.0, size.1, &section)?;
             for corner in grid.corners(width, height) {
@@ -136,7 +135,8 @@ impl ThesisEstimator {
         for halving in 0..self.reduced.len() {
             let (done, rest) = self.reduced.split_at_mut(halving);
             match done.last().and_then(Image::view) {
-                Some(larger) => sum_of_four(larger, &mut rest[0]),
+                Some(larger) if halving < SUMS => sum_of_four(larger, &mut rest[0]),
+                Some(larger) => mean_of_four(larger, &mut rest[0]),
                 None => sum_of_four(picture, &mut rest[0]),
             }
         }

@@ -96,7 +96,7 @@ pub use fit::ShapeConfig;
 pub use flatten::Flattener;
 pub use peaks::{Peak, PeakConfig, PeakFinder};
 pub use plane::{SideInSection, most_confident_three, plane_from_waves, pose_in_plane};
-pub use reduce::sum_of_four;
+pub use reduce::{mean_of_four, sum_of_four};
 pub use score::{Candidate, ScoreConfig, score_peaks};
 pub use search::{Hypothesis, SearchConfig};
 pub use section::{SectionAnalyser, SectionConfig, SectionSpectrum};
