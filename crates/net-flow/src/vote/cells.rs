@@ -110,10 +110,18 @@ impl Layout {
             let p = pixel_from_lattice(Vector2::new(f64::from(corner.0) + i, f64::from(corner.1) + j))?;
             (p.x.is_finite() && p.y.is_finite()).then_some(p)
         };
-        // The level at which a sample of the middle cell is about a pixel.
-        let (i, j) = (self.columns as f64 / 2.0, self.rows as f64 / 2.0);
-        let (Some(o), Some(a), Some(b)) = (at(i, j), at(i + 1.0, j), at(i, j + 1.0)) else { return false };
-        let cell_px = (a - o).norm().min((b - o).norm());
+        // The level at which a sample of the cell nearest to the middle that can be laid out is about a pixel.
+        let (columns, rows) = (self.columns as i32, self.rows as i32);
+        let sides = |k: i32| {
+            let (i, j) = (f64::from(k % columns), f64::from(k / columns));
+            let (o, a, b) = (at(i, j)?, at(i + 1.0, j)?, at(i, j + 1.0)?);
+            Some((
+                (2 * (k % columns) - columns).pow(2) + (2 * (k / columns) - rows).pow(2),
+                (a - o).norm().min((b - o).norm()),
+            ))
+        };
+        let nearest = (0..columns * rows).filter_map(sides).min_by_key(|(from_middle, _)| *from_middle);
+        let Some((_, cell_px)) = nearest else { return false };
         let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, self.pyramid.len() as f64 - 1.0) as usize;
         let Some(view) = self.pyramid.level(level) else { return false };
         let scale = f64::from(1u32 << level);

@@ -33,6 +33,10 @@ impl Evidence {
         }
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
     pub(super) fn clear(&mut self) {
         self.frames.clear();
         self.dropped = 0;

@@ -4,9 +4,13 @@
 //! broken meshes) is compared with the frame before, moved by every whole shift in reach. The right shift stands out from the others by many of their deviations.
 //! Where it does not, evidence is added up over frames, since a velocity that is wrong by a cell a frame is wrong by the same cell every time; until it
 //! suffices the answer is *ambiguous*, with the rivals.
+//!
+//! A frame in which too few cells can be laid out is *blind*; the next one is compared with the last that was not. A [`CellMap`] keeps what was seen of each cell, to
+//! recognise a place when the net was lost on the way.
 
 mod cells;
 mod evidence;
+mod recall;
 mod score;
 
 use nalgebra::Vector2;
@@ -16,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Result, in_range};
 use cells::{Cells, Layout};
 use evidence::Evidence;
+pub use recall::{CellMap, Recall, RecallConfig};
 use score::Scores;
 
 /// Parameters of the vote.
@@ -60,13 +65,13 @@ impl VoteConfig {
 /// What the vote says of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The first frame: nothing to compare with.
+    /// Nothing to compare with: the first frame, none in common with the one before, or too long ago.
     Started,
     /// The shift is certain.
     Decided,
     /// It is not: keep the prediction, and say so.
     Ambiguous,
-    /// Too few cells in common, or no lattice to see.
+    /// Too few cells can be laid out in this frame: it says nothing, and the next is compared with an earlier one.
     Blind,
 }
 
@@ -119,8 +124,11 @@ impl VoteResult {
 pub struct CellVote {
     config: VoteConfig,
     layout: Layout,
+    /// The last frame that was laid out, and the one before it.
     here: Cells,
     before: Cells,
+    /// Blind frames since.
+    gap: usize,
     scores: Scores,
     evidence: Evidence,
 }
@@ -138,6 +146,7 @@ impl CellVote {
             layout: Layout::new(columns, rows)?,
             here: Cells::new(columns, rows),
             before: Cells::new(columns, rows),
+            gap: 0,
             scores: Scores::new(config.reach_cells),
             evidence: Evidence::new(config),
         })
@@ -145,8 +154,10 @@ impl CellVote {
 
     /// Forgets the frames so far.
     pub fn reset(&mut self) {
+        self.here.clear();
         self.before.clear();
         self.evidence.clear();
+        self.gap = 0;
     }
 
     /// The next frame. `middle` is the cell to lay out round (the one at the optical axis), `pixel_from_lattice` tells where a lattice coordinate (cycles along
@@ -158,30 +169,54 @@ impl CellVote {
         middle: (i32, i32),
         pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> VoteResult {
-        std::mem::swap(&mut self.here, &mut self.before);
         let corner = (
             middle.0.saturating_sub(self.config.half_columns as i32),
             middle.1.saturating_sub(self.config.half_rows as i32),
         );
-        let seen = self.layout.fill(view, corner, pixel_from_lattice, &mut self.here);
-        if !seen {
-            self.here.clear();
-        }
-        if self.before.is_empty() {
-            self.evidence.clear();
-            return VoteResult::without_scores(if seen { Verdict::Started } else { Verdict::Blind });
-        }
-        let compared = if seen { self.scores.compare(&self.before, &self.here) } else { 0 };
-        if compared == 0 {
-            // This frame says nothing: the next cannot be compared with it, and the chain of evidence ends here.
-            self.evidence.clear();
+        if !self.layout.fill(view, corner, pixel_from_lattice, &mut self.before) {
+            self.before.clear();
+            self.gap += 1;
+            if !self.evidence.is_empty() || self.gap > self.config.memory_frames {
+                // Doubt cannot be followed over a gap, and a long one may hide any step.
+                self.reset();
+            }
             return VoteResult::without_scores(Verdict::Blind);
+        }
+        std::mem::swap(&mut self.here, &mut self.before);
+        let gap = std::mem::take(&mut self.gap) > 0;
+        let compared = if self.before.is_empty() { 0 } else { self.scores.compare(&self.before, &self.here) };
+        if compared == 0 {
+            self.evidence.clear();
+            return VoteResult::without_scores(Verdict::Started);
         }
         let result = self.evidence.add(self.scores.z(), compared);
         if let Some(correction) = result.correction() {
             self.here.renumber(correction);
             self.evidence.clear();
+        } else if gap {
+            // What happened in the gap happened once, not in every frame: one look has to decide.
+            self.evidence.clear();
+            return VoteResult::without_scores(Verdict::Started);
         }
         result
+    }
+
+    /// Adds the frame of the last update to a map, by the numbers that its result gave. Only frames whose numbers are certain belong there.
+    pub fn remember(&self, map: &mut CellMap) {
+        if self.gap == 0 {
+            map.add(&self.here);
+        }
+    }
+
+    /// Looks for the frame of the last update in a map. `around`: cells to be added to its numbers where the search begins. `None` if the frame or the map is empty, or they have
+    /// too little in common.
+    pub fn recall(&self, map: &mut CellMap, around: (i32, i32)) -> Option<Recall> {
+        if self.gap == 0 { map.find(&self.here, around) } else { None }
+    }
+
+    /// Moves the numbers of the last frame, for a caller that learned better.
+    pub fn renumber(&mut self, by: (i32, i32)) {
+        self.here.renumber(by);
+        self.evidence.clear();
     }
 }

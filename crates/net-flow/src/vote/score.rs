@@ -3,9 +3,9 @@
 use super::cells::{Cells, MIN_CELLS, dot};
 
 /// Blocks of the common cells, across and down: their median is deaf to a fish that covers two of them.
-const BLOCKS: (usize, usize) = (3, 2);
+pub(super) const BLOCKS: (usize, usize) = (3, 2);
 /// A block with fewer cells has no voice.
-const MIN_BLOCK: f32 = 4.0;
+pub(super) const MIN_BLOCK: f32 = 4.0;
 /// Bounds and weight of the two kinds of evidence: patches, and knots' brightness.
 const MAX_PATCH_Z: f64 = 8.0;
 const MAX_KNOT_Z: f64 = 4.0;
@@ -117,15 +117,17 @@ fn one(before: &Cells, here: &Cells, shift: (i32, i32)) -> (usize, Option<f64>, 
 
 /// To deviations from the median over all shifts.
 fn standardise(scores: &mut [Option<f64>], sorted: &mut Vec<f64>) {
-    let mut median = |values: &mut dyn Iterator<Item = f64>| {
-        sorted.clear();
-        sorted.extend(values);
-        let middle = sorted.len() / 2;
-        if sorted.is_empty() { 0.0 } else { *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 }
-    };
-    let centre = median(&mut scores.iter().flatten().copied());
-    let spread = 1.4826 * median(&mut scores.iter().flatten().map(|s| (s - centre).abs()));
+    let centre = median(&mut scores.iter().flatten().copied(), sorted).unwrap_or(0.0);
+    let spread = 1.4826 * median(&mut scores.iter().flatten().map(|s| (s - centre).abs()), sorted).unwrap_or(0.0);
     for score in scores.iter_mut().flatten() {
         *score = (*score - centre) / spread.max(1e-6);
     }
+}
+
+/// The middle one, the upper of two; `None` of nothing.
+pub(super) fn median(values: &mut dyn Iterator<Item = f64>, sorted: &mut Vec<f64>) -> Option<f64> {
+    sorted.clear();
+    sorted.extend(values);
+    let middle = sorted.len() / 2;
+    (!sorted.is_empty()).then(|| *sorted.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
