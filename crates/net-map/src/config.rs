@@ -23,6 +23,8 @@ pub struct Config {
     pub hole_sum_llr: f64,
     /// Least neighbourhood contrast, deviations, of a look that may call a twine missing for certain (the first of the two rules), 0 to 100. Default 3.
     pub certain_contrast: f64,
+    /// Shortest twine, px between its knots, that a look may call missing, 0 to 1000. Default 16: below, a tuft of weed that hides a part of the twine looks like a gap.
+    pub missing_min_px: f64,
     /// Smallest cells, px, in which growth is measured, 4 to 1000. Default 12: below, twine and growth are one blur.
     pub growth_min_px: f64,
 }
@@ -38,6 +40,7 @@ impl Default for Config {
             hole_one_llr: -6.0,
             hole_sum_llr: -13.0,
             certain_contrast: 3.0,
+            missing_min_px: 16.0,
             growth_min_px: 12.0,
         }
     }
@@ -60,6 +63,7 @@ impl Config {
         within("hole_one_llr", self.hole_one_llr, -1000.0, 0.0, "-1000 to 0")?;
         within("hole_sum_llr", self.hole_sum_llr, -1000.0, 0.0, "-1000 to 0")?;
         within("certain_contrast", self.certain_contrast, 0.0, 100.0, "0 to 100 deviations")?;
+        within("missing_min_px", self.missing_min_px, 0.0, 1000.0, "0 to 1000 px")?;
         within("growth_min_px", self.growth_min_px, 4.0, 1000.0, "4 to 1000 px")
     }
 }

@@ -14,7 +14,7 @@
 //! Cell `(i, j)` lies between the nodes `(i, j)` and `(i + 1, j + 1)`; other conventions are those of [`net_geometry`].
 //!
 //! # What is not safe
-//! - The map lays pictures out as the caller's [`NetView`] says. A sheet that misfits blurs the mosaic and, with it, whatever is counted by it.
+//! - The map lays pictures out as the caller's [`NetView`] says. A fitted sheet that misfits blurs the mosaic; measured knots do not.
 //! - The map believes the count of cells. A count that slipped in silence draws the same mesh twice, and a hole seen on both sides of the slip is two holes.
 //! - The blocked share is what the picture shows: blur widens thin twine (a clean net has a share above that of its twine), a fish that the junction stage did not see counts as growth, and
 //!   so does a second net close behind. Compare meshes with each other rather than with a ruler.

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use net_geometry::nalgebra::Vector2;
+
 use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::frame::{Frame, NetView, in_reach};
+use crate::frame::{Frame, NetView, Seen, TwineLook, in_reach};
 use crate::patch::Patches;
 use crate::store::{Cache, TileStore};
 use crate::tile::{Tile, TileKey};
@@ -45,7 +47,12 @@ impl<S: TileStore> Mapper<S> {
         let Self { config, cache, patches, .. } = self;
         for look in frame.twines.iter().filter(|t| t.direction < 2 && in_reach(t.index)) {
             let (key, place) = TileKey::of(frame.track, look.index);
-            cache.tile(key)?.twines[place][look.direction].add(look, frame.number, frame.axis, config);
+            let mut look = *look;
+            if look.seen == Seen::Missing && length_px(frame.view, &look).is_some_and(|l| l < config.missing_min_px) {
+                // Too far away to tell a gap from weed.
+                look.seen = Seen::Unknown;
+            }
+            cache.tile(key)?.twines[place][look.direction].add(&look, frame.number, frame.axis, config);
         }
         let mut result = Ok(());
         patches.lay_out(frame.image, frame.view, frame.twines, |view| {
@@ -104,4 +111,11 @@ impl<S: TileStore> Mapper<S> {
     pub fn save(&mut self) -> Result<()> {
         self.cache.save_all()
     }
+}
+
+/// Distance between the knots at a twine's ends, px.
+fn length_px(view: &impl NetView, look: &TwineLook) -> Option<f64> {
+    let from = Vector2::new(f64::from(look.index.0), f64::from(look.index.1));
+    let to = from + if look.direction == 0 { Vector2::x() } else { Vector2::y() };
+    Some((view.pixel(to)?.0 - view.pixel(from)?.0).norm())
 }
