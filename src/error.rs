@@ -25,6 +25,12 @@ pub enum Error {
     /// The junction detectors.
     #[error(transparent)]
     Junction(#[from] net_junction::Error),
+    /// A prior that is no motion.
+    #[error("prior: {what}")]
+    Prior {
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// A time that does not come after the one before.
     #[error("frame time {timestamp_ns} ns does not come after the frame before, {previous_ns} ns")]
     TimeOrder {

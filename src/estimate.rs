@@ -21,6 +21,31 @@ impl Status {
     }
 }
 
+/// How the count of cells of a frame goes on from the frames before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Connection {
+    /// The first count.
+    Started,
+    /// From frame to frame.
+    Followed,
+    /// The net was lost, or in doubt, and what was seen of its cells before told which ones these are: an earlier count goes on, and with it its number.
+    Recognised,
+    /// The net was lost, or in doubt: a new count, with another origin.
+    Restarted,
+}
+
+impl Connection {
+    /// The word used in files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Started => "started",
+            Self::Followed => "followed",
+            Self::Recognised => "recognised",
+            Self::Restarted => "restarted",
+        }
+    }
+}
+
 /// A net's pose with what follows from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NetPose {
@@ -75,9 +100,11 @@ pub struct Estimate<'a> {
     pub probability: f64,
     /// The pose, when the status is [`Status::Ok`].
     pub net: Option<NetPose>,
-    /// Number of the count of cells. While it stays the same the net frame's origin is the same node; it grows by one each time the
-    /// net was lost and the count had to start anew.
+    /// Number of the count of cells. Frames of the same number have the same node as the net frame's origin. Each time the net was lost and the count had to start
+    /// anew it is one that was not there before; when a place is recognised it is again that of the earlier count.
     pub track: u32,
+    /// How that count goes on from the frames before; of frames with a pose.
+    pub connection: Connection,
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
     /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].

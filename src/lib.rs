@@ -6,14 +6,17 @@
 mod config;
 mod error;
 mod estimate;
+mod knots;
 mod method;
 mod motion;
+mod prior;
 mod tracker;
 
 pub use config::{Config, Method};
 pub use error::{Error, Result};
-pub use estimate::{Estimate, Layer, NetPose, Sheet, Status};
+pub use estimate::{Connection, Estimate, Layer, NetPose, Sheet, Status};
 pub use net_geometry::{Camera, Junction, JunctionState, Lens, Mesh, Plane, Pose};
 pub use net_image::GrayView;
 pub use net_junction::{Twine, TwineState};
+pub use prior::MotionPrior;
 pub use tracker::Tracker;

@@ -1,7 +1,9 @@
-//! Constant velocity: where the net should be in the next frame.
+//! Where the net should be in the next frame: by the caller's word, or at constant velocity.
 
 use net_geometry::Pose;
-use net_geometry::nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use net_geometry::nalgebra::{Rotation3, UnitQuaternion, Vector2, Vector3};
+
+use crate::prior::MotionPrior;
 
 /// Longest gap between frames, s, over which a velocity is carried on.
 const LONGEST_GAP_S: f64 = 1.0;
@@ -12,9 +14,21 @@ pub(crate) struct Motion {
     last: Option<(i64, Pose)>,
     /// Turn of the net as the camera sees it, rad/s, and velocity of the camera in the net frame, m/s.
     velocity: Option<(Vector3<f64>, Vector3<f64>)>,
+    /// What the caller said of the motion since the last pose; `None` if it said nothing of some frame.
+    since: Option<MotionPrior>,
 }
 
 impl Motion {
+    /// Another frame, and what the caller knows of the motion to it. Before anything is predicted.
+    pub fn carry(&mut self, prior: Option<&MotionPrior>) {
+        self.since = self.since.zip(prior).map(|(since, prior)| prior.after(&since));
+    }
+
+    /// The pose expected by the caller's word, and its standard deviation along the net's X and Y, m, at the optical axis.
+    pub fn by_prior(&self) -> Option<(Pose, Vector2<f64>)> {
+        self.since?.carry(&self.last?.1)
+    }
+
     /// The pose expected at `timestamp_ns`; `None` without a velocity from two recent poses.
     pub fn predict(&self, timestamp_ns: i64) -> Option<Pose> {
         let (then, pose) = self.last?;
@@ -40,6 +54,7 @@ impl Motion {
             })
         });
         self.last = Some((timestamp_ns, *pose));
+        self.since = Some(MotionPrior::rest());
     }
 }
 

@@ -4,9 +4,10 @@ use net_image::GrayView;
 
 use crate::config::{Config, Method};
 use crate::error::{Error, Result};
-use crate::estimate::{Estimate, Layer, Status};
+use crate::estimate::{Connection, Estimate, Layer, Status};
 use crate::method::lattice::LatticeMethod;
 use crate::method::thesis::{PROBABILITY_THRESHOLD, ThesisMethod};
+use crate::prior::MotionPrior;
 
 /// Follows one net through the frames of one camera. Owns all buffers: after the first frames an update allocates nothing.
 #[derive(Debug)]
@@ -61,6 +62,26 @@ impl Tracker {
     /// [`Error::Geometry`] for an image of another size than the camera's, [`Error::TimeOrder`] for a time that does not come
     /// after the frame before. The tracker is then as it was.
     pub fn update(&mut self, image: GrayView<'_>, timestamp_ns: i64) -> Result<Estimate<'_>> {
+        self.next(image, timestamp_ns, None)
+    }
+
+    /// The same with the caller's prediction of the camera's motion since the last update. Steps of most of a cell between frames are then no riddle, and the net may be out of view for a
+    /// while: what priors say of the frames in between adds up. A prior that the picture contradicts decides nothing: the picture's own count is taken, or a new one begins.
+    /// [`crate::Method::Thesis`] takes no notice of it.
+    ///
+    /// # Errors
+    /// As [`Tracker::update`]; [`Error::Prior`] for what is no motion.
+    pub fn update_with_prior(
+        &mut self,
+        image: GrayView<'_>,
+        timestamp_ns: i64,
+        prior: &MotionPrior,
+    ) -> Result<Estimate<'_>> {
+        prior.validate()?;
+        self.next(image, timestamp_ns, Some(prior))
+    }
+
+    fn next(&mut self, image: GrayView<'_>, timestamp_ns: i64, prior: Option<&MotionPrior>) -> Result<Estimate<'_>> {
         // A side past u32 cannot be a calibrated camera's either.
         let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         self.camera.check_image_size(side(image.width()), side(image.height()))?;
@@ -70,10 +91,11 @@ impl Tracker {
         self.previous_ns = Some(timestamp_ns);
         self.junctions.clear();
         let found = match &mut self.method {
-            Engine::Lattice(method) => method.update(image, timestamp_ns, &mut self.junctions)?,
+            Engine::Lattice(method) => method.update(image, timestamp_ns, prior, &mut self.junctions)?,
             Engine::Thesis(method) => method.update(image, &mut self.junctions)?,
         };
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
+        let connection = found.map_or(Connection::Followed, |f| f.connection);
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
         let status = if net.is_some() { Status::Ok } else { Status::NoNet };
         self.layers.clear();
@@ -90,7 +112,8 @@ impl Tracker {
             Engine::Lattice(method) if net.is_some() => method.twines(),
             _ => &[],
         };
-        Ok(Estimate { status, probability, net, track, junctions: &self.junctions, twines, layers: &self.layers })
+        let (junctions, layers) = (&self.junctions, &self.layers);
+        Ok(Estimate { status, probability, net, track, connection, junctions, twines, layers })
     }
 
     /// Where a point of the lattice (fractions included) is in the last frame that had a pose: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as
@@ -98,6 +121,14 @@ impl Tracker {
     pub fn pixel_from_lattice(&self, at: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         match &self.method {
             Engine::Lattice(method) => method.pixel_from_lattice(at),
+            Engine::Thesis(_) => None,
+        }
+    }
+
+    /// The same pixel by the knots that were measured, bilinear between them, and a little beyond. Where the sheet misfits, this is where the net is. `None` where no knot is near.
+    pub fn pixel_by_knots(&self, at: Vector2<f64>) -> Option<Vector2<f64>> {
+        match &self.method {
+            Engine::Lattice(method) => method.pixel_by_knots(at),
             Engine::Thesis(_) => None,
         }
     }

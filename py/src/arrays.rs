@@ -1,11 +1,13 @@
 //! Numpy arrays in and out.
 
+use net_geometry::Pose;
+use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 use net_image::convert::grey_from_colour;
 use net_image::{ColourLayout, GrayView, Image};
 use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::camera::of_argument;
@@ -80,6 +82,24 @@ impl<'py> Pixels<'py> {
 /// A float64 array of two dimensions; `shape` says which, for the error.
 pub fn float_array<'py>(name: &str, shape: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
     object.extract().map_err(|_| wrong_type(name, &format!("float64 of shape {shape}"), object))
+}
+
+/// A (4, 4) pose as argument `name`.
+pub fn pose_argument(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Pose> {
+    let array = float_array(name, "(4, 4)", object)?;
+    let m = array.as_array();
+    if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
+        return Err(PyValueError::new_err(format!(
+            "{name}: expected finite numbers of shape (4, 4), got {:?}",
+            m.shape()
+        )));
+    }
+    let rotation = Matrix3::from_fn(|r, c| m[(r, c)]);
+    if (rotation * rotation.transpose() - Matrix3::identity()).amax() > 1e-6 || rotation.determinant() < 0.0 {
+        return Err(PyValueError::new_err(format!("{name}: its upper left 3 x 3 is not a rotation")));
+    }
+    let translation = Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)]);
+    Ok(Pose { rotation: Rotation3::from_matrix_unchecked(rotation), translation })
 }
 
 fn wrong_type(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyErr {

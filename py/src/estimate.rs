@@ -14,6 +14,8 @@ pub struct Estimate {
     probability: f64,
     #[pyo3(get)]
     track: u32,
+    #[pyo3(get)]
+    connection: &'static str,
     net: Option<netpose::NetPose>,
     junctions: Vec<netpose::Junction>,
     layers: Vec<netpose::Layer>,
@@ -69,6 +71,7 @@ impl Estimate {
             status: estimate.status.as_str(),
             probability: estimate.probability,
             track: estimate.track,
+            connection: estimate.connection.as_str(),
             net: estimate.net,
             junctions: estimate.junctions.to_vec(),
             layers: estimate.layers.to_vec(),

@@ -1,8 +1,11 @@
 //! `Tracker` and `estimate`.
 
+use net_geometry::nalgebra::Matrix6;
+use netpose::MotionPrior;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::GrayArgument;
+use crate::arrays::{GrayArgument, float_array, pose_argument};
 use crate::camera::{Camera, Mesh, of_argument, value_error};
 use crate::estimate::Estimate;
 
@@ -25,14 +28,42 @@ impl Tracker {
         let image = GrayArgument::new("image", image)?;
         let view = image.view()?;
         let tracker = &mut self.inner;
-        py.detach(|| tracker.update(view, timestamp_ns).map(|e| Estimate::from_frame(&e))).map_err(|error| {
-            let argument = match error {
-                netpose::Error::TimeOrder { .. } => "timestamp_ns",
-                _ => "image",
-            };
-            of_argument(argument, error)
-        })
+        py.detach(|| tracker.update(view, timestamp_ns).map(|e| Estimate::from_frame(&e))).map_err(named)
     }
+
+    fn update_with_prior(
+        &mut self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        timestamp_ns: i64,
+        motion: &Bound<'_, PyAny>,
+        covariance: &Bound<'_, PyAny>,
+    ) -> PyResult<Estimate> {
+        let image = GrayArgument::new("image", image)?;
+        let view = image.view()?;
+        let array = float_array("covariance", "(6, 6)", covariance)?;
+        let c = array.as_array();
+        if c.dim() != (6, 6) {
+            return Err(PyValueError::new_err(format!("covariance: expected shape (6, 6), got {:?}", c.shape())));
+        }
+        let prior = MotionPrior {
+            now_from_before: pose_argument("motion", motion)?,
+            covariance: Matrix6::from_fn(|r, k| c[(r, k)]),
+        };
+        let tracker = &mut self.inner;
+        py.detach(|| tracker.update_with_prior(view, timestamp_ns, &prior).map(|e| Estimate::from_frame(&e)))
+            .map_err(named)
+    }
+}
+
+/// An error with the argument that it is about.
+fn named(error: netpose::Error) -> PyErr {
+    let argument = match error {
+        netpose::Error::TimeOrder { .. } => "timestamp_ns",
+        netpose::Error::Prior { .. } => "covariance",
+        _ => "image",
+    };
+    of_argument(argument, error)
 }
 
 /// One image, no state.

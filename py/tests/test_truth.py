@@ -111,6 +111,39 @@ def test_a_tracker_counts_cells() -> None:
     assert way == pytest.approx(true_way, abs=0.005)
 
 
+def test_a_prior_carries_the_count_over_steps_of_most_of_a_cell() -> None:
+    # Every eighth frame of the middle of the sequence: steps of one to two cells.
+    frames = [npr.sim.render("strafe", k) for k in range(40, 65, 8)]
+    tracker = npr.Tracker(frames[0].camera, frames[0].mesh)
+    results = [tracker.update(frames[0].image, frames[0].timestamp_ns)]
+    covariance = np.diag([1e-3] * 3 + [2e-3] * 3) ** 2
+    for before, now in zip(frames, frames[1:], strict=False):
+        assert before.pose is not None and now.pose is not None
+        motion = now.pose @ np.linalg.inv(before.pose)
+        results.append(tracker.update_with_prior(now.image, now.timestamp_ns, motion, covariance))
+    assert [r.status for r in results] == ["ok"] * len(frames)
+    assert [r.connection for r in results] == ["started"] + ["followed"] * (len(frames) - 1)
+    places = [(-p[:3, :3].T @ p[:3, 3]) for r in results if (p := r.pose) is not None]
+    true_places = [(-p[:3, :3].T @ p[:3, 3]) for f in frames if (p := f.pose) is not None]
+    for place, true_place in zip(places, true_places, strict=True):
+        # Whole cells would show, they are 50 mm.
+        way, true_way = np.linalg.norm(place - places[0]), np.linalg.norm(true_place - true_places[0])
+        assert way == pytest.approx(true_way, abs=0.005)
+
+
+def test_what_is_no_prior_is_refused(plain: npr.sim.SimFrame) -> None:
+    tracker = npr.Tracker(plain.camera, plain.mesh)
+    motion, covariance = np.eye(4), np.eye(6)
+    with pytest.raises(ValueError, match="motion"):
+        tracker.update_with_prior(plain.image, 0, 2 * motion, covariance)
+    with pytest.raises(ValueError, match="covariance"):
+        tracker.update_with_prior(plain.image, 0, motion, -covariance)
+    with pytest.raises(ValueError, match="covariance"):
+        tracker.update_with_prior(plain.image, 0, motion, np.eye(5))
+    with pytest.raises(TypeError, match="motion"):
+        tracker.update_with_prior(plain.image, 0, motion.astype(np.float32), covariance)
+
+
 def test_the_same_picture_gives_the_same_answer(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
     again = npr.estimate(plain.image, plain.camera, plain.mesh)
     assert again.probability == result.probability

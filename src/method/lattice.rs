@@ -1,6 +1,5 @@
 //! The precise way: one lattice on one sheet over the whole picture, followed from frame to frame.
 
-use net_flow::vote::{CellVote, VoteConfig, VoteResult};
 use net_flow::{FlowTracker, Hints, Motion as FlowMotion, Status};
 use net_geometry::nalgebra::Vector2;
 use net_geometry::{Camera, Junction, Mesh, Pose};
@@ -9,9 +8,12 @@ use net_junction::{AdjustConfig, LatticeMap, NetAdjuster, Twine};
 use net_lattice::{LatticeEstimate, LatticeEstimator};
 
 use crate::error::Result;
-use crate::estimate::{Layer, NetPose, Sheet};
-use crate::method::{Found, Track};
+use crate::estimate::{Connection, Layer, NetPose, Sheet};
+use crate::knots::Knots;
+use crate::method::Found;
+use crate::method::count::{CellCount, Naming};
 use crate::motion::Motion;
+use crate::prior::MotionPrior;
 
 /// Follows the lattice; starts anew when it is lost.
 #[derive(Debug)]
@@ -19,14 +21,16 @@ pub(crate) struct LatticeMethod {
     estimator: LatticeEstimator,
     threshold: f64,
     motion: Motion,
-    track: Track,
+    count: CellCount,
     flow: FlowTracker,
-    vote: CellVote,
     /// The last answer that was vouched for, and when.
     last: Option<(i64, LatticeEstimate)>,
     /// When the frame was taken that the flow starts from, if its answer was vouched for.
     flow_from: Option<i64>,
     adjuster: NetAdjuster,
+    /// Twines of the last answer, and where its lattice is by the knots that were measured.
+    twines: Vec<Twine>,
+    knots: Knots,
 }
 
 /// Distance, cells, between predicted and found lattice above which a count is not carried over a gap.
@@ -40,22 +44,55 @@ const FOLLOWED_COSINE: f64 = 0.99939;
 /// Longest time over which names are carried on without a velocity.
 const LONGEST_GAP_NS: i64 = 1_000_000_000;
 
-/// How the nodes of a frame got their names.
+/// Largest standard deviation of a prior, cells, that names nodes by itself: three of them are half a cell.
+const SURE_PRIOR_CELLS: f64 = 1.0 / 6.0;
+
+/// Where the net may be, by witness, with how sure its names are.
 #[derive(Debug, Clone, Copy)]
-enum Naming {
-    /// Where they were predicted, within a fraction of a cell.
-    Sure,
-    /// The likeliest; may be off by whole cells.
-    Guess,
-    /// Nothing to go by.
-    New,
+struct Expected {
+    /// Whether the caller gave a prior.
+    by_prior: bool,
+    /// By a sure prior, else at constant velocity, else by a vague prior.
+    first: Option<(Pose, Naming)>,
+    /// At constant velocity.
+    steady: Option<(Pose, Naming)>,
+    /// As the picture flowed.
+    flowed: Option<(Pose, Naming)>,
+    /// As if nothing had moved.
+    rest: Option<(Pose, Naming)>,
+}
+
+impl Expected {
+    /// With a prior: whether another witness that is sure of itself gives other names.
+    fn contradicts(&self, named: &LatticeEstimate) -> bool {
+        let other = |(pose, naming): &(Pose, Naming)| {
+            *naming == Naming::Sure && named.counted_on(pose).is_some_and(|(other, _)| !same_names(&other, named))
+        };
+        self.by_prior && (self.steady.as_ref().is_some_and(other) || self.flowed.as_ref().is_some_and(other))
+    }
+}
+
+/// Names for a sheet found anew: as predicted, else as the picture flowed, else as if nothing had moved.
+fn name(estimate: LatticeEstimate, expected: &Expected) -> (LatticeEstimate, Naming) {
+    let named = |(pose, naming): (Pose, Naming)| {
+        let (named, off) = estimate.counted_on(&pose)?;
+        Some((named, if off < COUNTED_ON_CELLS { naming } else { Naming::Guess }))
+    };
+    let by = |witness: Option<(Pose, Naming)>| witness.and_then(named);
+    let found = by(expected.first).or_else(|| by(expected.flowed)).or_else(|| by(expected.rest));
+    found.unwrap_or((estimate, Naming::New))
+}
+
+fn same_names(a: &LatticeEstimate, b: &LatticeEstimate) -> bool {
+    (a.pose.translation - b.pose.translation).norm() < 1e-9
 }
 
 /// Whether a followed answer is what was predicted, nearly. One that is not may have locked half a cell aside at the rim: look anew.
 fn is_near(followed: &LatticeEstimate, predicted: &Pose) -> bool {
-    let same_names = |named: &LatticeEstimate| (named.pose.translation - followed.pose.translation).norm() < 1e-9;
     followed.pose.normal().dot(&predicted.normal()) > FOLLOWED_COSINE
-        && followed.counted_on(predicted).is_some_and(|(named, off)| off < FOLLOWED_CELLS && same_names(&named))
+        && followed
+            .counted_on(predicted)
+            .is_some_and(|(named, off)| off < FOLLOWED_CELLS && same_names(&named, followed))
 }
 
 impl LatticeMethod {
@@ -65,12 +102,13 @@ impl LatticeMethod {
             estimator: LatticeEstimator::new(camera, mesh, config)?,
             threshold: config.probability_threshold,
             motion: Motion::default(),
-            track: Track::default(),
+            count: CellCount::new()?,
             flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
-            vote: CellVote::new(&VoteConfig::default())?,
             last: None,
             flow_from: None,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
+            twines: Vec::new(),
+            knots: Knots::default(),
         })
     }
 
@@ -79,92 +117,100 @@ impl LatticeMethod {
         &mut self,
         image: GrayView<'_>,
         timestamp_ns: i64,
+        prior: Option<&MotionPrior>,
         junctions: &mut Vec<Junction>,
     ) -> Result<Option<Found>> {
         let step = self.flow.update(image, &Hints::default())?.step;
-        // A steady motion says where the lattice is to a fraction of a cell, which is what following takes.
-        let predicted = self.motion.predict(timestamp_ns);
+        let flow = step.motion.map(|motion| (motion, step.status == Status::Tracked));
+        self.motion.carry(prior);
+        let expected = self.expect(timestamp_ns, flow);
+        // A prior, or a steady motion, says where the lattice is to a fraction of a cell, which is what following takes.
         let mut found = None;
-        if let Some(pose) = &predicted {
+        if let Some((pose, naming)) = &expected.first {
             let followed = self.estimator.update(image, pose)?;
             let followed = followed.filter(|e| e.probability >= self.threshold && is_near(e, pose));
-            found = followed.map(|estimate| (estimate, Naming::Sure));
+            found = followed.map(|estimate| (estimate, *naming));
         }
         if found.is_none() {
-            found = self.estimator.estimate(image)?.map(|estimate| {
-                let flow = step.motion.map(|motion| (motion, step.status == Status::Tracked));
-                self.name(estimate, timestamp_ns, predicted.as_ref(), flow)
-            });
+            found = self.estimator.estimate(image)?.map(|estimate| name(estimate, &expected));
+        }
+        // Who contradicts leaves a guess.
+        if let Some((estimate, naming)) = &mut found
+            && *naming == Naming::Sure
+            && expected.first.is_some_and(|(_, naming)| naming == Naming::Sure)
+            && expected.contradicts(estimate)
+        {
+            *naming = Naming::Guess;
         }
         let Some((mut estimate, naming)) = found else {
             self.flow_from = None;
             return Ok(None);
         };
         let vouched = estimate.probability >= self.threshold;
+        let mut connection = Connection::Followed;
         if vouched {
-            estimate = self.judge(image, estimate, naming);
+            self.list_junctions(image, &estimate, junctions)?;
+            (estimate, connection) = self.count_cells(image, estimate, naming, junctions);
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
-            self.list_junctions(image, &estimate, junctions)?;
         }
-        let answer = Found { net: net_pose(&estimate), probability: estimate.probability, track: self.track.number() };
+        let (net, probability, track) = (net_pose(&estimate), estimate.probability, self.count.track());
         self.flow_from = vouched.then_some(timestamp_ns);
         if vouched {
             self.last = Some((timestamp_ns, estimate));
         }
-        Ok(Some(answer))
+        Ok(Some(Found { net, probability, track, connection }))
     }
 
-    /// Names for a sheet found anew: as predicted, else as the picture flowed, else as if nothing had moved.
-    fn name(
-        &self,
-        estimate: LatticeEstimate,
-        timestamp_ns: i64,
-        predicted: Option<&Pose>,
-        flow: Option<(FlowMotion, bool)>,
-    ) -> (LatticeEstimate, Naming) {
-        let named = |pose: &Pose, sure: bool| {
-            let (named, off) = estimate.counted_on(pose)?;
-            Some((named, if sure && off < COUNTED_ON_CELLS { Naming::Sure } else { Naming::Guess }))
-        };
-        let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
-        let by_flow = || {
-            let (then, last) = recent?;
-            let (motion, tracked) = flow.filter(|_| self.flow_from == Some(*then))?;
-            named(&self.pose_after(last, &motion)?, tracked)
-        };
-        let by_rest = || named(&recent?.1.pose, false);
-        let found = predicted.and_then(|pose| named(pose, true)).or_else(by_flow).or_else(by_rest);
-        found.unwrap_or((estimate, Naming::New))
-    }
-
-    /// What does not repeat has the last word on the count of cells; where it is silent, a guess is a new count.
-    fn judge(&mut self, image: GrayView<'_>, estimate: LatticeEstimate, naming: Naming) -> LatticeEstimate {
-        if matches!(naming, Naming::New) {
-            self.vote.reset();
-        }
-        let camera = self.estimator.camera();
-        let middle = SheetMap { estimate: &estimate, camera }.seed();
-        let vote = middle.map(|middle| {
-            self.vote.update(image, middle, |ij| estimate.pixel_from_lattice(camera, ij).map(|(pixel, _)| pixel))
+    /// Where the net may be, from the surest witness to the least.
+    fn expect(&self, timestamp_ns: i64, flow: Option<(FlowMotion, bool)>) -> Expected {
+        let naming = |sure: bool| if sure { Naming::Sure } else { Naming::Guess };
+        let sides = [self.estimator.mesh().side1(), self.estimator.mesh().side2()];
+        let prior = self.motion.by_prior().map(|(pose, sigma)| {
+            let cells = (sigma.x / sides[0]).max(sigma.y / sides[1]);
+            (pose, naming(cells < SURE_PRIOR_CELLS))
         });
-        let correction = vote.as_ref().and_then(VoteResult::correction);
-        match (naming, vote, correction) {
-            (Naming::New, ..) | (Naming::Guess, _, None) => self.restart(),
-            // Sure enough without a vote.
-            (Naming::Sure, _, None) => (),
-            // The frames before this one were numbered right, or are not in doubt.
-            (_, _, Some((0, 0))) => (),
-            (Naming::Guess, Some(vote), Some(cells)) if vote.frames == 1 && vote.dropped == 0 => {
-                return estimate.renumbered(cells);
-            }
-            // Numbers were given that now prove wrong by whole cells: those go under the old count, these under a new one.
-            (_, _, Some(cells)) => {
-                self.restart();
-                return estimate.renumbered(cells);
-            }
+        // Over frames without a pose a velocity is a guess.
+        let gapless = self.last.as_ref().is_some_and(|(then, _)| self.flow_from == Some(*then));
+        let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, naming(gapless)));
+        let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
+        let flowed = recent
+            .zip(flow)
+            .filter(|_| gapless)
+            .and_then(|((_, last), (motion, tracked))| Some((self.pose_after(last, &motion)?, naming(tracked))));
+        let rest = recent.map(|(_, last)| (last.pose, Naming::Guess));
+        // A vague prior is worth less than a velocity.
+        let vague = prior.filter(|(_, naming)| *naming == Naming::Guess);
+        let first = prior.filter(|(_, naming)| *naming == Naming::Sure).or(steady).or(vague);
+        Expected { by_prior: prior.is_some(), first, steady, flowed, rest }
+    }
+
+    /// What does not repeat has the last word on the names of nodes; where it is silent, a guess is a new count.
+    fn count_cells(
+        &mut self,
+        image: GrayView<'_>,
+        estimate: LatticeEstimate,
+        naming: Naming,
+        junctions: &mut [Junction],
+    ) -> (LatticeEstimate, Connection) {
+        let camera = self.estimator.camera();
+        self.knots.fill(junctions, |ij| estimate.pixel_from_lattice(camera, ij).map(|(pixel, _)| pixel));
+        let middle = SheetMap { estimate: &estimate, camera }.seed().unwrap_or_default();
+        let knots = &self.knots;
+        let counted = self.count.update(image, middle, naming, |ij| knots.pixel(ij));
+        if !matches!(counted.connection, Connection::Followed) {
+            // What was renamed has no velocity: the change of names would look like one.
+            self.motion = Motion::default();
         }
-        estimate
+        if counted.cells == (0, 0) {
+            return (estimate, counted.connection);
+        }
+        let moved =
+            |index: (i32, i32)| (index.0.saturating_add(counted.cells.0), index.1.saturating_add(counted.cells.1));
+        junctions.iter_mut().for_each(|j| j.index = j.index.map(moved));
+        self.twines.iter_mut().for_each(|t| t.index = moved(t.index));
+        self.knots.renumber(counted.cells);
+        (estimate.renumbered(counted.cells), counted.connection)
     }
 
     /// The net before or behind the one of the last frame that had a pose, in that frame's picture.
@@ -176,7 +222,12 @@ impl LatticeMethod {
 
     /// The twines of the last frame that had a pose.
     pub fn twines(&self) -> &[Twine] {
-        self.adjuster.twines()
+        &self.twines
+    }
+
+    /// Pixel of a lattice point by the measured knots of the last frame that had a pose.
+    pub fn pixel_by_knots(&self, at: Vector2<f64>) -> Option<Vector2<f64>> {
+        self.knots.pixel(at)
     }
 
     /// Pixel and depth, m, of a lattice point in the last frame that had a pose.
@@ -188,12 +239,6 @@ impl LatticeMethod {
     pub fn lattice_at_axis(&self) -> Option<Vector2<f64>> {
         let camera = self.estimator.camera();
         self.last.as_ref()?.1.lattice_from_pixel(camera, Vector2::new(camera.cx(), camera.cy()))
-    }
-
-    /// A new count. What was renamed has no velocity: the change of names would look like one.
-    fn restart(&mut self) {
-        self.track.start();
-        self.motion = Motion::default();
     }
 
     /// The last pose, moved along the net as the picture moved about the optical axis.
@@ -216,6 +261,8 @@ impl LatticeMethod {
     ) -> Result<()> {
         let map = SheetMap { estimate, camera: self.estimator.camera() };
         junctions.extend_from_slice(self.adjuster.adjust(image, &map)?);
+        self.twines.clear();
+        self.twines.extend_from_slice(self.adjuster.twines());
         Ok(())
     }
 }

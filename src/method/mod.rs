@@ -1,9 +1,10 @@
 //! The ways to a pose: same inputs, same [`Found`].
 
+mod count;
 pub(crate) mod lattice;
 pub(crate) mod thesis;
 
-use crate::estimate::NetPose;
+use crate::estimate::{Connection, NetPose};
 
 /// What a method says of one frame, before the decision whether to vouch for it.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +15,8 @@ pub(crate) struct Found {
     pub probability: f64,
     /// Number of the count of cells; another number, another origin.
     pub track: u32,
+    /// How the count goes on from the frames before.
+    pub connection: Connection,
 }
 
 /// Numbers the counts of cells: each has an origin of its own.
@@ -22,8 +25,10 @@ pub(crate) struct Track(Option<u32>);
 
 impl Track {
     /// A new count begins.
-    pub fn start(&mut self) {
-        self.0 = Some(self.number() + u32::from(self.0.is_some()));
+    pub fn start(&mut self) -> Connection {
+        let first = self.0.is_none();
+        self.0 = Some(self.number() + u32::from(!first));
+        if first { Connection::Started } else { Connection::Restarted }
     }
 
     /// The present count; the first is 0.

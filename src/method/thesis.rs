@@ -8,7 +8,7 @@ use net_image::GrayView;
 use net_junction::{Expectation, ExpectedNet, JunctionDetector};
 
 use crate::error::Result;
-use crate::estimate::NetPose;
+use crate::estimate::{Connection, NetPose};
 use crate::method::{Found, Track};
 
 /// Probability from which a pose is vouched for. On random scenes of the simulator (`net-fft`, `examples/study.rs`) 0.7 refuses 3 right poses in 188 more than 0.5 would, and
@@ -25,6 +25,7 @@ pub(crate) struct ThesisMethod {
     detector: JunctionDetector,
     flow: FlowTracker,
     track: Track,
+    connection: Connection,
     /// The junction that is followed, its index, and the pose, all of the last frame that had one.
     last: Option<(Vector2<f64>, (i32, i32), Pose)>,
 }
@@ -38,6 +39,7 @@ impl ThesisMethod {
             detector: JunctionDetector::new(width, height, &net_junction::Config::default())?,
             flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
             track: Track::default(),
+            connection: Connection::Followed,
             last: None,
         })
     }
@@ -84,8 +86,9 @@ impl ThesisMethod {
             let nearest = named.min_by(|a, b| away(a).total_cmp(&away(b))).filter(|j| away(j) <= reach)?;
             nearest.index.map(|(i, j)| (index.0 - i, index.1 - j))
         });
+        self.connection = Connection::Followed;
         goes_on.unwrap_or_else(|| {
-            self.track.start();
+            self.connection = self.track.start();
             (0, 0)
         })
     }
@@ -105,7 +108,7 @@ impl ThesisMethod {
             sigma_xy_m: estimate.covariance.sigma_xy(&estimate.pose),
             sheet: None,
         };
-        Found { net, probability: estimate.probability, track: self.track.number() }
+        Found { net, probability: estimate.probability, track: self.track.number(), connection: self.connection }
     }
 }
 

@@ -126,7 +126,11 @@ class Estimate:
         """(N, 2) lattice indices (i, j) of ``junctions``; the lowest int32 where a junction has no name."""
     @property
     def track(self) -> int:
-        """Number of the count of cells: grows by one each time the net was lost and the origin is another node."""
+        """Number of the count of cells: frames of the same number have the same node as origin."""
+    @property
+    def connection(self) -> Literal["started", "followed", "recognised", "restarted"]:
+        """How that count goes on from the frames before; of frames with a pose. ``recognised``: the net was lost, and what was seen of
+        its cells before told which ones these are. ``restarted``: it was lost, and a new count began."""
     @property
     def layers(self) -> list[Layer]:
         """All nets that can be vouched for, nearest first, with ``layers=True``; empty without, and with no pose."""
@@ -185,6 +189,19 @@ class Tracker:
     def update(self, image: _Image, timestamp_ns: int) -> Estimate:
         """The next frame. Raises ValueError for an image of another size than the camera's, or a time that does not come
         after the frame before; TypeError for another dtype or shape."""
+    def update_with_prior(
+        self,
+        image: _Image,
+        timestamp_ns: int,
+        motion: npt.NDArray[np.float64],
+        covariance: npt.NDArray[np.float64],
+    ) -> Estimate:
+        """The same with the camera's motion since the last update as the vehicle knows it.
+
+        motion: (4, 4), from the camera frame of the last update to that of this one: a resting point is at
+        ``motion @ X_before``. covariance: (6, 6), rotation (rad) then translation (m), perturbation in the camera frame of now. It
+        decides which cell a step led to where the picture does not tell; a prior that the picture contradicts decides nothing.
+        Raises ValueError for what is no motion or no covariance."""
 
 def estimate(
     image: _Image, camera: Camera, mesh: Mesh, *, method: _Method | None = None, layers: bool = False

@@ -1,13 +1,11 @@
 //! `netpose_rs.junction`
 
-use net_geometry::Pose;
-use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 use net_junction::{Config, Expectation, ExpectedNet, JunctionDetector};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{GrayArgument, array2, float_array};
+use crate::arrays::{GrayArgument, array2, pose_argument};
 use crate::camera::{Camera, Mesh, of_argument};
 use crate::estimate::index_or_unnamed;
 use crate::stages::pixels;
@@ -55,7 +53,7 @@ pub fn detect(
     let expectation = match (camera, mesh, pose) {
         (None, None, None) => None,
         (Some(camera), Some(mesh), Some(pose)) => {
-            let pose = read_pose(pose)?;
+            let pose = pose_argument("pose", pose)?;
             Some(Expectation::Net(ExpectedNet { camera: camera.inner, mesh: mesh.inner, pose, anchored: true }))
         }
         _ => return Err(PyValueError::new_err("camera, mesh and pose go together: give all three or none")),
@@ -67,21 +65,4 @@ pub fn detect(
         Ok(Junctions { junctions, boxes })
     })
     .map_err(|error: net_junction::Error| of_argument("image", error))
-}
-
-fn read_pose(pose: &Bound<'_, PyAny>) -> PyResult<Pose> {
-    let pose = float_array("pose", "(4, 4)", pose)?;
-    let m = pose.as_array();
-    if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
-        return Err(PyValueError::new_err(format!(
-            "pose: expected finite numbers of shape (4, 4), got {:?}",
-            m.shape()
-        )));
-    }
-    let rotation = Matrix3::from_fn(|r, c| m[(r, c)]);
-    if (rotation * rotation.transpose() - Matrix3::identity()).amax() > 1e-6 || rotation.determinant() < 0.0 {
-        return Err(PyValueError::new_err("pose: its upper left 3 x 3 is not a rotation"));
-    }
-    let translation = Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)]);
-    Ok(Pose { rotation: Rotation3::from_matrix_unchecked(rotation), translation })
 }

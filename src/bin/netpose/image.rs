@@ -82,6 +82,7 @@ fn estimate(
             probability: estimate.probability,
             net: estimate.net.as_ref(),
             junctions: estimate.junctions,
+            twines: estimate.twines,
             latency_ms,
         };
         let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();

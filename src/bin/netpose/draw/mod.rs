@@ -9,7 +9,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use net_image::GrayView;
-use netpose::{Camera, Junction, Mesh, NetPose, Status};
+use netpose::{Camera, Junction, Mesh, NetPose, Status, Twine};
 
 pub use canvas::{Canvas, Colour};
 
@@ -23,6 +23,7 @@ pub struct Shown<'a> {
     pub probability: f64,
     pub net: Option<&'a NetPose>,
     pub junctions: &'a [Junction],
+    pub twines: &'a [Twine],
     pub latency_ms: f64,
 }
 
@@ -37,7 +38,7 @@ impl Overlay {
     /// The frame with lattice, junctions, axes and a status line that begins with `name`.
     pub fn draw(&self, gray: GrayView<'_>, name: &str, shown: &Shown<'_>) -> Canvas {
         let mut canvas = Canvas::from_gray(gray);
-        let named = net::draw_twine(&mut canvas, shown.junctions);
+        let named = net::draw_twine(&mut canvas, shown.junctions, shown.twines);
         let lattice = shown.net.map(|net| (&net.pose, self.mesh_as_it_hangs(net)));
         if let Some((pose, mesh)) = lattice.filter(|_| !named) {
             net::draw_lattice(&mut canvas, &self.camera, &mesh, pose);
@@ -104,6 +105,28 @@ mod tests {
 
     use super::*;
 
+    /// A missing twine is red, from knot to knot.
+    #[test]
+    fn twines_have_the_colour_of_their_state() {
+        let camera = Camera::new(600.0, 600.0, 99.5, 99.5, 200, 200, Lens::None).unwrap();
+        let knot = |k: i32| Junction {
+            pixel: Vector2::new(f64::from(40 + 60 * k), 150.0),
+            index: Some((k, 0)),
+            sigma_px: 0.1,
+            state: JunctionState::Seen,
+        };
+        let twine = |k: i32, state| Twine { index: (k, 0), direction: 0, state, llr: 0.0, contrast: 5.0 };
+        let twines = &[twine(0, netpose::TwineState::Present), twine(1, netpose::TwineState::Missing)];
+        let junctions = &[knot(0), knot(1), knot(2)];
+        let shown = Shown { status: Status::Ok, probability: 0.9, net: None, junctions, twines, latency_ms: 5.0 };
+        let dark = net_image::Image::<u8>::new(200, 200);
+        let overlay = Overlay { camera, mesh: Mesh::square(0.05).unwrap() };
+        let canvas = overlay.draw(dark.view().unwrap(), "frame 7", &shown);
+        let (present, missing) = (canvas.pixel(70, 150), canvas.pixel(130, 150));
+        assert!(present[2] > 100 && present[0] < 60, "{present:?}");
+        assert!(missing[0] > 200 && missing[2] < 60, "{missing:?}");
+    }
+
     /// The lattice is drawn where the pose says: bright lines on the nodes, nothing in the middle of the cells.
     #[test]
     fn the_lattice_is_drawn_where_the_pose_says() {
@@ -125,8 +148,9 @@ mod tests {
         };
         let hidden =
             Junction { pixel: Vector2::new(700.0, 400.0), index: None, sigma_px: 0.1, state: JunctionState::Hidden };
+        let junctions = &[hidden];
         let shown =
-            Shown { status: Status::Ok, probability: 0.9, net: Some(&net), junctions: &[hidden], latency_ms: 5.0 };
+            Shown { status: Status::Ok, probability: 0.9, net: Some(&net), junctions, twines: &[], latency_ms: 5.0 };
         let dark = net_image::Image::<u8>::new(848, 480);
         let canvas = Overlay { camera, mesh }.draw(dark.view().unwrap(), "frame 7", &shown);
         let light = |i: f64, j: f64| {

@@ -4,12 +4,15 @@ use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
 use net_geometry::nalgebra::{Matrix2, Vector2, Vector3};
-use netpose::{Camera, Junction, JunctionState, Mesh, Pose};
+use netpose::{Camera, Junction, JunctionState, Mesh, Pose, Twine, TwineState};
 
 use super::canvas::{Canvas, Colour};
 
 const LINE: Colour = [60, 220, 255];
 const JUNCTION: Colour = [255, 190, 40];
+const MISSING: Colour = [255, 40, 40];
+const HIDDEN: Colour = [150, 150, 160];
+const FOULED: Colour = [70, 210, 70];
 const AXES: [Colour; 3] = [[255, 70, 70], [70, 230, 70], [90, 130, 255]];
 
 /// Lattice lines drawn at most on each side of the origin; past it the picture would be nothing but lines.
@@ -17,17 +20,36 @@ const MOST_LINES: f64 = 400.0;
 /// Cells smaller than this, px, are drawn every second, fourth, ... line.
 const LEAST_GAP_PX: f64 = 7.0;
 
-/// Draws the twine between junctions that have a name: follows a bent net, which no plane does. False if none has one.
-pub fn draw_twine(canvas: &mut Canvas, junctions: &[Junction]) -> bool {
+/// How each state of a twine is drawn: colour, width in px, opacity.
+fn stroke(state: TwineState) -> (Colour, f64, f64) {
+    match state {
+        TwineState::Present => (LINE, 1.0, 0.6),
+        TwineState::Unknown => (LINE, 1.0, 0.25),
+        TwineState::Missing => (MISSING, 2.0, 0.9),
+        TwineState::Hidden => (HIDDEN, 1.0, 0.7),
+        TwineState::Fouled => (FOULED, 2.0, 0.7),
+    }
+}
+
+/// Draws the twine between junctions that have a name, each in the colour of its state: follows a bent net, which no plane does. False if none has a name.
+pub fn draw_twine(canvas: &mut Canvas, junctions: &[Junction], twines: &[Twine]) -> bool {
     let named: HashMap<(i32, i32), Vector2<f64>> =
         junctions.iter().filter_map(|junction| Some((junction.index?, junction.pixel))).collect();
-    // In the junctions' order: a map's own order differs from run to run, and so would the overlapping strokes.
-    for ((i, j), from) in junctions.iter().filter_map(|junction| Some((junction.index?, junction.pixel))) {
-        for next in [(i.saturating_add(1), j), (i, j.saturating_add(1))] {
-            if let Some(to) = named.get(&next) {
-                canvas.line(from, *to, 1.0, LINE, 0.6);
-            }
+    let mut line = |(i, j): (i32, i32), direction: usize, state: TwineState| {
+        let next = if direction == 0 { (i.saturating_add(1), j) } else { (i, j.saturating_add(1)) };
+        if let (Some(from), Some(to)) = (named.get(&(i, j)), named.get(&next)) {
+            let (colour, width, opacity) = stroke(state);
+            canvas.line(*from, *to, width, colour, opacity);
         }
+    };
+    // In the order of lists: a map's own order differs from run to run, and so would the overlapping strokes.
+    if twines.is_empty() {
+        for index in junctions.iter().filter_map(|junction| junction.index) {
+            line(index, 0, TwineState::Present);
+            line(index, 1, TwineState::Present);
+        }
+    } else {
+        twines.iter().for_each(|t| line(t.index, t.direction, t.state));
     }
     !named.is_empty()
 }
@@ -43,7 +65,7 @@ pub fn draw_axes(canvas: &mut Canvas, camera: &Camera, mesh: &Mesh, pose: &Pose)
     NetView { camera, mesh, pose }.axes(canvas);
 }
 
-/// A mark for a junction: a ring where it was seen, a cross where it is known to be but not seen.
+/// A mark for a junction: a ring where it was seen, a cross where it is known to be but not seen, in the colour of what is amiss.
 pub fn draw_junction(canvas: &mut Canvas, junction: &Junction) {
     let p = junction.pixel;
     if junction.state == JunctionState::Seen {
@@ -51,7 +73,13 @@ pub fn draw_junction(canvas: &mut Canvas, junction: &Junction) {
         return;
     }
     for d in [Vector2::new(3.0, 3.0), Vector2::new(3.0, -3.0)] {
-        canvas.line(p - d, p + d, 1.2, JUNCTION, 0.8);
+        let colour = match junction.state {
+            JunctionState::Missing => MISSING,
+            JunctionState::Hidden => HIDDEN,
+            JunctionState::Fouled => FOULED,
+            _ => JUNCTION,
+        };
+        canvas.line(p - d, p + d, 1.2, colour, 0.8);
     }
 }
 

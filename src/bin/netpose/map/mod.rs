@@ -12,7 +12,7 @@ use net_image::GrayView;
 use net_map::{Config, Frame, Mapper, Seen, TwineLook};
 use netpose::{Mesh, Tracker, Twine, TwineState};
 
-use crate::run::{Counted, Nodes};
+use crate::run::Counted;
 use disk::Disk;
 
 /// The map of a run under construction.
@@ -32,21 +32,15 @@ impl NetMap {
     }
 
     /// Adds the frame that the tracker did last, if its count is certain.
-    pub fn add(
-        &mut self,
-        counted: &Counted,
-        image: GrayView<'_>,
-        tracker: &Tracker,
-        nodes: &Nodes,
-        twines: &[Twine],
-    ) -> Result<()> {
+    pub fn add(&mut self, counted: &Counted, image: GrayView<'_>, tracker: &Tracker, twines: &[Twine]) -> Result<()> {
         let Some(axis) = tracker.lattice_at_axis().filter(|_| counted.sure) else { return Ok(()) };
         let number = u32::try_from(counted.frame).context("the map counts to four thousand million frames")?;
         let offset = counted.offset;
         let shift = Vector2::new(f64::from(offset.0), f64::from(offset.1));
         self.looks.clear();
         self.looks.extend(twines.iter().map(|t| look(t, offset)));
-        let view = |at: Vector2<f64>| Some((nodes.pixel(at - shift)?, tracker.pixel_from_lattice(at - shift)?.1));
+        let view =
+            |at: Vector2<f64>| Some((tracker.pixel_by_knots(at - shift)?, tracker.pixel_from_lattice(at - shift)?.1));
         let track = counted.stretch;
         self.mapper.add(&Frame { number, track, image, view: &view, axis: axis + shift, twines: &self.looks })?;
         Ok(())

@@ -1,18 +1,17 @@
 //! Which cells: the vote on what does not repeat in the picture, frame after frame. It connects counts that the tracker began anew, and corrects one that slipped.
 //!
-//! `count.csv` has the outcome, a row for each frame with a pose. Doubt is resolved backwards where the vote says how; where it does not, a new stretch begins.
+//! `count.csv` has the outcome, a row for each frame with a pose. Doubt is resolved backwards where the vote says how; where it does not, a new stretch begins, unless the cells
+//! in view are recognised: every stretch keeps a map of its own.
 
 use std::collections::VecDeque;
 use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use net_flow::vote::{CellVote, Verdict, VoteConfig};
+use net_flow::vote::{CellMap, CellVote, RecallConfig, Verdict, VoteConfig};
 use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
 use netpose::Tracker;
-
-use super::nodes::Nodes;
 
 /// The columns of `count.csv`.
 pub const HEADER: [&str; 8] = ["frame", "track", "stretch", "offset_i", "offset_j", "verdict", "z", "sure"];
@@ -28,7 +27,16 @@ pub fn forget(dir: &Path) -> Result<()> {
     }
 }
 
-/// What the vote says of a frame's lattice coordinates.
+/// What is said of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Said {
+    /// By the vote, against the frame before.
+    Voted(Verdict),
+    /// By the map of an earlier stretch.
+    Recognised,
+}
+
+/// What is known of a frame's lattice coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counted {
     pub frame: u64,
@@ -38,10 +46,26 @@ pub struct Counted {
     pub stretch: u32,
     /// Cells to add to the tracker's.
     pub offset: (i32, i32),
-    verdict: Verdict,
+    said: Said,
     z: f64,
     /// Whether this is certain: an undecided frame is left out of the map.
     pub sure: bool,
+}
+
+/// Cells that a map holds along each direction.
+const MAP_CELLS: usize = 256;
+/// Stretches whose maps are kept.
+const MAPS: usize = 4;
+/// Times that a young stretch is looked up in them, and frames between.
+const LOOK_UPS: u32 = 8;
+const LOOK_UP_EVERY: u32 = 4;
+
+/// An earlier stretch.
+struct Earlier {
+    stretch: u32,
+    map: CellMap,
+    /// Cells to be added to the present stretch's coordinates where the search begins.
+    around: (i32, i32),
 }
 
 /// Follows the count of a run.
@@ -49,7 +73,14 @@ pub struct Count {
     vote: CellVote,
     memory: usize,
     last_track: Option<u32>,
+    /// The present stretch, and the first number that none has.
     stretch: u32,
+    next: u32,
+    /// Certain frames of it, its map, and the cell at the optical axis in the last one.
+    age: u32,
+    map: CellMap,
+    middle: (i32, i32),
+    earlier: Vec<Earlier>,
     offset: (i32, i32),
     /// Frames in doubt, oldest first.
     doubted: VecDeque<Counted>,
@@ -65,7 +96,20 @@ impl Count {
         let config = VoteConfig::default();
         let memory = config.memory_frames;
         let vote = CellVote::new(&config)?;
-        Ok(Self { vote, memory, last_track: None, stretch: 0, offset: (0, 0), doubted: VecDeque::new(), table })
+        Ok(Self {
+            vote,
+            memory,
+            last_track: None,
+            stretch: 0,
+            next: 1,
+            age: 0,
+            map: new_map()?,
+            middle: (0, 0),
+            earlier: Vec::new(),
+            offset: (0, 0),
+            doubted: VecDeque::new(),
+            table,
+        })
     }
 
     /// The frame that the tracker did last, which has a pose. `None` if its method knows no lattice.
@@ -75,11 +119,10 @@ impl Count {
         track: u32,
         image: GrayView<'_>,
         tracker: &Tracker,
-        nodes: &Nodes,
     ) -> Result<Option<Counted>> {
         let Some(axis) = tracker.lattice_at_axis().filter(|a| a.amax() < 1e8) else { return Ok(None) };
         let middle = (axis.x.round() as i32, axis.y.round() as i32);
-        self.step(frame, track, middle, image, |at| nodes.pixel(at)).map(Some)
+        self.step(frame, track, middle, image, |at| tracker.pixel_by_knots(at)).map(Some)
     }
 
     fn step(
@@ -91,7 +134,6 @@ impl Count {
         pixel: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Result<Counted> {
         let changed = self.last_track.is_some_and(|last| last != track);
-        let first = self.last_track.is_none();
         self.last_track = Some(track);
         if changed && !self.doubted.is_empty() {
             // What has been added up was about another count.
@@ -110,33 +152,40 @@ impl Count {
             result = vote(self);
         }
         let broken = result.verdict == Verdict::Decided && result.dropped > 0;
-        if (result.verdict == Verdict::Started && !first) || broken {
+        let begins = result.verdict == Verdict::Started && self.age > 0;
+        if broken || begins || result.verdict == Verdict::Blind {
             self.give_up()?;
-            self.stretch += 1;
         }
-        if result.verdict == Verdict::Blind {
-            // Whatever comes next is connected with this frame at best, and this one with none.
-            self.break_off()?;
-        }
-        let sure = match result.verdict {
-            Verdict::Decided | Verdict::Started => true,
-            Verdict::Ambiguous | Verdict::Blind => false,
-        };
         if let Some(correction) = result.correction() {
             let k = result.shifts[0].cells;
             // Each undecided frame was off by k more than the one before.
             for (n, doubted) in self.doubted.iter_mut().enumerate() {
                 let n = n as i32 + 1;
-                doubted.offset = (doubted.offset.0.saturating_add(n * k.0), doubted.offset.1.saturating_add(n * k.1));
+                doubted.offset = plus(doubted.offset, (n * k.0, n * k.1));
                 doubted.sure = true;
             }
             self.give_up()?;
-            self.offset = (offset.0.saturating_add(correction.0), offset.1.saturating_add(correction.1));
+            self.offset = plus(offset, correction);
         }
-        let z = if sure && result.verdict == Verdict::Started { f64::NAN } else { result.shifts[0].z };
-        let (stretch, offset) = (self.stretch, self.offset);
-        let counted = Counted { frame, track, stretch, offset, verdict: result.verdict, z, sure };
+        let sure = matches!(result.verdict, Verdict::Decided | Verdict::Started);
+        let (mut said, mut z) = (Said::Voted(result.verdict), result.shifts[0].z);
+        let here = plus(middle, self.offset);
+        if broken || begins {
+            self.begin_stretch(here)?;
+        }
         if sure {
+            if self.age.is_multiple_of(LOOK_UP_EVERY)
+                && self.age < LOOK_UPS * LOOK_UP_EVERY
+                && let Some(recognised) = self.look_up()
+            {
+                (said, z) = (Said::Recognised, recognised);
+            }
+            self.age = self.age.saturating_add(1);
+            self.vote.remember(&mut self.map);
+            self.middle = plus(middle, self.offset);
+        }
+        let counted = Counted { frame, track, stretch: self.stretch, offset: self.offset, said, z, sure };
+        if sure || result.verdict == Verdict::Blind {
             self.write(&counted)?;
         } else {
             self.doubted.push_back(counted);
@@ -147,6 +196,45 @@ impl Count {
             }
         }
         Ok(counted)
+    }
+
+    /// From here on nothing is known of how the count goes on. `here`: cell at the optical axis, in numbers that mean nothing yet.
+    fn begin_stretch(&mut self, here: (i32, i32)) -> Result<()> {
+        let around = minus(self.middle, here);
+        for earlier in &mut self.earlier {
+            earlier.around = plus(earlier.around, around);
+        }
+        if self.map.cells() > 0 {
+            let map = std::mem::replace(&mut self.map, new_map()?);
+            self.earlier.push(Earlier { stretch: self.stretch, map, around });
+            if self.earlier.len() > MAPS {
+                // The smallest is missed least.
+                let least = (0..self.earlier.len()).min_by_key(|&k| self.earlier[k].map.cells()).unwrap_or(0);
+                self.earlier.remove(least);
+            }
+        }
+        (self.stretch, self.age) = (self.next, 0);
+        self.next += 1;
+        Ok(())
+    }
+
+    /// If what is in view was seen in an earlier stretch, goes on with that one; by how many deviations it stood out.
+    fn look_up(&mut self) -> Option<f64> {
+        let found = (0..self.earlier.len()).rev().find_map(|k| {
+            let earlier = &mut self.earlier[k];
+            let place = self.vote.recall(&mut earlier.map, earlier.around).filter(|r| r.recognised)?;
+            Some((k, place))
+        });
+        let (k, place) = found?;
+        let known = self.earlier.remove(k);
+        self.vote.renumber(place.cells);
+        self.offset = plus(self.offset, place.cells);
+        (self.stretch, self.map) = (known.stretch, known.map);
+        for earlier in &mut self.earlier {
+            earlier.around = minus(earlier.around, place.cells);
+        }
+        self.age = LOOK_UPS * LOOK_UP_EVERY;
+        Some(place.z)
     }
 
     /// The next frame begins a new stretch.
@@ -171,18 +259,32 @@ impl Count {
     }
 
     fn write(&mut self, c: &Counted) -> Result<()> {
-        let verdict = match c.verdict {
-            Verdict::Started => "started",
-            Verdict::Decided => "decided",
-            Verdict::Ambiguous => "ambiguous",
-            Verdict::Blind => "blind",
+        let verdict = match c.said {
+            Said::Recognised => "recognised",
+            Said::Voted(Verdict::Started) => "started",
+            Said::Voted(Verdict::Decided) => "decided",
+            Said::Voted(Verdict::Ambiguous) => "ambiguous",
+            Said::Voted(Verdict::Blind) => "blind",
         };
-        let z = if c.z.is_finite() { format!("{:.2}", c.z) } else { String::new() };
+        let compared = !matches!(c.said, Said::Voted(Verdict::Started | Verdict::Blind));
+        let z = if compared { format!("{:.2}", c.z) } else { String::new() };
         let cells =
             [c.offset.0.to_string(), c.offset.1.to_string(), verdict.to_owned(), z, u8::from(c.sure).to_string()];
         let names = [c.frame.to_string(), c.track.to_string(), c.stretch.to_string()];
         Ok(self.table.write_record(names.into_iter().chain(cells))?)
     }
+}
+
+fn new_map() -> net_flow::Result<CellMap> {
+    CellMap::new(&RecallConfig { side_cells: MAP_CELLS, ..RecallConfig::default() })
+}
+
+fn plus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
+    (a.0.saturating_add(b.0), a.1.saturating_add(b.1))
+}
+
+fn minus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
+    (a.0.saturating_sub(b.0), a.1.saturating_sub(b.1))
 }
 
 #[cfg(test)]
@@ -195,7 +297,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_count_begun_anew_is_connected_and_a_blind_frame_parts() {
+    fn a_count_begun_anew_is_connected_also_over_a_blind_frame_and_far_away() {
         let dir = tempfile::tempdir().expect("a folder");
         let camera = Camera::new(450.0, 450.0, 239.5, 159.5, 480, 320, Lens::None).expect("a camera");
         let mesh = Mesh::square(0.05).expect("a mesh");
@@ -203,7 +305,7 @@ mod tests {
         let mut simulator = Simulator::new(camera);
         let mut count = Count::new(dir.path()).expect("a table");
         let mut counted = Vec::new();
-        for frame in 0..7_i32 {
+        for frame in 0..11_i32 {
             let pose = NetPose { range_m: 1.0, tilt_y_deg: 8.0, x_m: 0.03 * f64::from(frame), ..NetPose::default() };
             let scene = Scene { layers: vec![Layer { net: net.clone(), pose }], ..Scene::default() };
             let mut image = Image::default();
@@ -212,23 +314,31 @@ mod tests {
                 image = Image::new(480, 320);
             }
             // From the third frame on the tracker calls every cell by two less and one more.
-            let off = if frame < 2 { Vector2::zeros() } else { Vector2::new(2.0, -1.0) };
+            let off = match frame {
+                0..2 => Vector2::zeros(),
+                2..8 => Vector2::new(2.0, -1.0),
+                // Farther off than the vote looks.
+                _ => Vector2::new(-21.0, 17.0),
+            };
             let pose = pose.pose();
             let axis = mesh.coordinates(pose.net_from_ray(Vector3::z()).expect("in view")) - off;
             let pixel = |at: Vector2<f64>| {
                 let at = at + off;
                 camera.pixel_from_point(pose.transform(mesh.node(at.x, at.y).push(0.0)))
             };
-            let (middle, track) = ((axis.x.round() as i32, axis.y.round() as i32), u32::from(frame >= 2));
+            let (middle, track) =
+                ((axis.x.round() as i32, axis.y.round() as i32), u32::from(frame >= 2) + u32::from(frame >= 8));
             let view = image.view().expect("pixels");
             counted.push(count.step(u64::from(frame.unsigned_abs()), track, middle, view, pixel).expect("written"));
         }
         count.finish().expect("written");
         let told: Vec<_> = counted.iter().map(|c| (c.stretch, c.offset, c.sure)).collect();
-        let (before, after) = ((0, (0, 0), true), (0, (2, -1), true));
-        assert_eq!(told[..5], [before, before, after, after, after]);
-        assert!(!told[5].2 && told[6].0 == 1 && told[6].2, "{told:?}");
+        let (before, after, far) = ((0, (0, 0), true), (0, (2, -1), true), (0, (-21, 17), true));
+        let blind = (0, (2, -1), false);
+        assert_eq!(told, [before, before, after, after, after, blind, after, after, far, far, far]);
+        assert_eq!(counted[8].said, Said::Recognised);
+        assert!(counted[8].z > 10.0, "{}", counted[8].z);
         let table = std::fs::read_to_string(dir.path().join("count.csv")).expect("a table");
-        assert_eq!(table.lines().count(), 8, "{table}");
+        assert_eq!(table.lines().count(), 12, "{table}");
     }
 }

@@ -9,7 +9,7 @@ use net_log::{
     DEFAULT_CAMERA_FRAME, NetColumns, PoseRow, RawFrame, RowStatus, RunFiles, RunPaths, RunSummary, TimingHistogram,
     write_report,
 };
-use netpose::{Camera, NetPose, Status};
+use netpose::{Camera, Connection, NetPose, Status};
 
 use super::examples::Examples;
 use super::frames::Tracked;
@@ -17,8 +17,8 @@ use crate::draw::Overlay;
 use crate::failure::Outcome;
 
 /// Columns of `poses.csv` behind the usual ones: the count of cells, and how the net hangs where the method estimates it.
-pub const APPENDED: [&str; 5] =
-    ["track", "crossing_angle_deg", "sigma_crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m"];
+pub const APPENDED: [&str; 6] =
+    ["track", "crossing_angle_deg", "sigma_crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m", "recognised"];
 
 /// What to do with what is in the folder already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -231,11 +231,12 @@ fn appended(tracked: &Tracked, first_track: u32) -> Vec<f64> {
     let mut cells = vec![f64::NAN; APPENDED.len()];
     let Some(net) = &tracked.net else { return cells };
     cells[0] = f64::from(first_track.saturating_add(tracked.track));
-    cells[1..].copy_from_slice(&hanging(net));
+    cells[1..5].copy_from_slice(&hanging(net));
+    cells[5] = f64::from(u8::from(tracked.connection == Connection::Recognised));
     cells
 }
 
-/// How a net hangs, in the last four of [`APPENDED`].
+/// How a net hangs: [`APPENDED`] from the second to the fifth.
 pub fn hanging(net: &NetPose) -> [f64; 4] {
     net.sheet.map_or([f64::NAN; 4], |sheet| {
         let [larger, smaller] = sheet.curvatures_per_m;

@@ -7,13 +7,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use net_image::Image;
 use net_log::{Log, RawFrame};
-use netpose::{Camera, Config, Error, Layer, Mesh, NetPose, Status, Tracker};
+use netpose::{Camera, Config, Connection, Error, Layer, Mesh, NetPose, Status, Tracker};
 
 use super::ahead::in_order;
 use super::count::{self, Count};
 use super::folder::{Ended, Finished, Folder};
 use super::layers::{self, LayersCsv};
-use super::nodes::Nodes;
 use super::overlays::Overlays;
 use crate::draw::{Overlay, Shown};
 use crate::interrupt::Interrupt;
@@ -60,6 +59,8 @@ pub struct Tracked {
     pub probability: f64,
     /// Number of the count of cells: another number, another origin.
     pub track: u32,
+    /// How that count goes on.
+    pub connection: Connection,
     pub net: Option<NetPose>,
     pub junctions: Vec<netpose::Junction>,
     pub twines: Vec<netpose::Twine>,
@@ -77,6 +78,7 @@ impl Tracked {
             probability: self.probability,
             net: self.net.as_ref(),
             junctions: &self.junctions,
+            twines: &self.twines,
             latency_ms: 1e3 * self.latency.as_secs_f64(),
         }
     }
@@ -118,13 +120,11 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
             folder.write(&frame, time, tracked.as_ref().map_err(String::as_str))?;
             match (&tracked, image) {
                 (Ok(tracked), Ok(image)) => {
-                    if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view()) {
-                        let nodes = Nodes::new(&tracked.junctions, |at| Some(tracker.pixel_from_lattice(at)?.0));
-                        if let Some(counted) = count.update(frame.index, tracked.track, view, &tracker, &nodes)?
-                            && let Some(map) = &mut map
-                        {
-                            map.add(&counted, view, &tracker, &nodes, &tracked.twines)?;
-                        }
+                    if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view())
+                        && let Some(counted) = count.update(frame.index, tracked.track, view, &tracker)?
+                        && let Some(map) = &mut map
+                    {
+                        map.add(&counted, view, &tracker, &tracked.twines)?;
                     }
                     if let Some(layers) = &mut layers {
                         layers.write(&frame, tracked)?;
@@ -169,6 +169,7 @@ fn track(
             status: estimate.status,
             probability: estimate.probability,
             track: estimate.track,
+            connection: estimate.connection,
             net: estimate.net,
             latency: start.elapsed(),
             junctions: estimate.junctions.to_vec(),

@@ -14,7 +14,7 @@ pub struct LayersCsv(PosesCsv);
 impl LayersCsv {
     /// A new file in the run's folder.
     pub fn create(dir: &Path) -> Result<Self> {
-        let appended: Vec<&str> = APPENDED[1..].iter().copied().chain(["layer", "followed"]).collect();
+        let appended: Vec<&str> = APPENDED[1..5].iter().copied().chain(["layer", "followed"]).collect();
         Ok(Self(PosesCsv::create(&path(dir), &appended)?))
     }
 

@@ -6,7 +6,6 @@ mod examples;
 mod folder;
 mod frames;
 mod layers;
-mod nodes;
 mod overlays;
 
 use std::num::NonZeroU64;
@@ -21,7 +20,6 @@ use crate::interrupt::Interrupt;
 use crate::options::Setup;
 pub use count::{Counted, HEADER as COUNT_HEADER};
 use folder::{Existing, Folder};
-pub use nodes::Nodes;
 
 /// Where the net is, frame by frame, in a log of images.
 #[derive(Debug, clap::Args)]

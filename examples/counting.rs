@@ -1,0 +1,200 @@
+//! Does the count of cells slip in silence? The tracker over many random simulated sequences, the count held against the truth in every frame.
+//!
+//! ```text
+//! cargo run --release --example counting -- [SEQUENCES [FRAMES [FIRST_SEED]]]
+//! ```
+//! A small camera (424 x 240 px), steps of up to a cell a frame in every direction, speeds that change, turns and tilts; nets flat and bent, jittered, overgrown; murky water, noise, fish.
+//! A slip is a count that is off by more than half a cell against the frame before of the same `track`. A frame is flagged if its count was begun anew.
+
+use std::error::Error;
+
+use net_geometry::nalgebra::Vector2;
+use net_sim::{Growth, Image, NetPose, Object, Path, Scenario, Simulator, Surface, Water};
+use netpose::{Config, Connection, Status, Tracker};
+
+/// Uniform numbers (Knuth's 64-bit linear congruence, upper bits).
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Kinds of sequences.
+const KINDS: [&str; 5] = ["strafe", "loop", "approach", "bent", "fish"];
+const CELL_M: f64 = 0.05;
+const RATE_HZ: f64 = 10.0;
+
+/// A sequence of this kind.
+fn sequence(kind: usize, frames: u32, seed: u64) -> Scenario {
+    let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ kind as u64);
+    for _ in 0..8 {
+        random.between(0.0, 1.0);
+    }
+    let mut scenario = Scenario { frames, rate_hz: RATE_HZ, seed, ..Scenario::default() };
+    let camera = &mut scenario.camera;
+    (camera.image_width, camera.image_height) = (424, 240);
+    (camera.fx, camera.fy, camera.cx, camera.cy) = (300.0, 300.0, 211.5, 119.5);
+    let scene = &mut scenario.scene;
+    let range_m = random.between(0.6, 1.2);
+    scene.layers[0].pose = NetPose {
+        range_m,
+        tilt_x_deg: random.between(-12.0, 12.0),
+        tilt_y_deg: random.between(-20.0, 20.0),
+        roll_deg: random.between(-8.0, 8.0),
+        x_m: random.between(-0.3, 0.3),
+        y_m: random.between(-0.3, 0.3),
+    };
+    let net = &mut scene.layers[0].net;
+    net.seed = seed;
+    net.jitter = random.between(0.015, 0.05);
+    net.slack = random.between(0.0, 0.02);
+    net.twine.variation = 0.05;
+    net.growth = Growth { density: random.between(0.0, 0.05), size_m: 0.014, ..Growth::default() };
+    scene.water.attenuation_per_m = Water::attenuation_of_visibility(random.between(4.0, 12.0));
+    scene.sensor.read_noise_grey = random.between(1.0, 3.0);
+    scene.sensor.exposure_s = 0.008;
+    if KINDS[kind] == "bent" {
+        net.surface = Surface {
+            curvature_per_m: [random.between(-0.5, 0.5), random.between(-0.2, 0.2), random.between(-0.4, 0.4)],
+            cubic_per_m2: [random.between(-0.2, 0.2), 0.0, random.between(-0.2, 0.2), 0.0],
+            ..Surface::default()
+        };
+    }
+    if KINDS[kind] == "fish" {
+        scene.objects = (0..4u8)
+            .map(|k| Object {
+                range_m: range_m * random.between(0.5, 0.8),
+                x_m: -0.4 - 0.5 * f64::from(k),
+                y_m: random.between(-0.2, 0.2),
+                turn_deg: 180.0,
+                length_m: 0.45,
+                width_m: 0.11,
+                grey: 75.0,
+                contrast: 0.65,
+                velocity_m_per_s: [0.35, 0.0, 0.0],
+                seed: seed + u64::from(k),
+                ..Object::default()
+            })
+            .collect();
+    }
+    // Up to a cell a frame.
+    let most = CELL_M * RATE_HZ;
+    let length_s = f64::from(frames) / RATE_HZ;
+    scenario.path = match KINDS[kind] {
+        // The longest step is that on the ellipse's longer side.
+        "loop" => {
+            let radius = random.between(0.5, 1.0) * most * length_s / std::f64::consts::TAU;
+            Path::Loop { radius_m: [radius, 0.6 * radius], depth_m: 0.08, nod_deg: 5.0, roll_deg: 4.0 }
+        }
+        "approach" => Path::Approach {
+            to_m: range_m * random.between(0.7, 1.3),
+            tilt_y_deg: random.between(-15.0, 15.0),
+            // Eased in and out: half as fast again in the middle as on average.
+            aside_m: [random.between(-0.65, 0.65) * most * length_s, random.between(-0.1, 0.1) * most * length_s],
+        },
+        _ => Path::Strafe {
+            speed_m_per_s: [random.between(-1.0, 1.0) * most, random.between(-1.0, 1.0) * most],
+            heave_m: 0.03,
+            sway_deg: 3.0,
+            period_s: 5.0,
+        },
+    };
+    scenario
+}
+
+/// What happened to a kind.
+#[derive(Debug, Default, Clone, Copy)]
+struct Tally {
+    frames: u32,
+    refused: u32,
+    flagged: u32,
+    recognised: u32,
+    silent: u32,
+    large_steps: u32,
+}
+
+fn run(scenario: &Scenario, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
+    let (camera, mesh) = (scenario.camera()?, scenario.mesh()?);
+    let mut tracker = Tracker::new(camera, mesh, &Config::default())?;
+    let mut simulator = Simulator::new(camera);
+    let mut image = Image::default();
+    // Of each count: what its names differ from the true ones by.
+    let mut known: Vec<(u32, Vector2<f64>)> = Vec::new();
+    let mut last_cells: Option<Vector2<f64>> = None;
+    for k in 0..scenario.frames {
+        let frame = scenario.frame(k)?;
+        let truth = simulator.render(&frame.scene, frame.seed, &mut image)?;
+        let Some(cells) = truth.layers.first().and_then(|l| l.axis).map(|a| a.cells) else { continue };
+        tally.frames += 1;
+        tally.large_steps += u32::from(last_cells.is_some_and(|last| (cells - last).amax() > 0.5));
+        last_cells = Some(cells);
+        let estimate = tracker.update(image.view().ok_or("no picture")?, frame.timestamp_ns)?;
+        let (status, track, connection) = (estimate.status, estimate.track, estimate.connection);
+        if status != Status::Ok {
+            tally.refused += 1;
+            continue;
+        }
+        tally.flagged += u32::from(connection == Connection::Restarted);
+        tally.recognised += u32::from(connection == Connection::Recognised);
+        let Some(found) = tracker.lattice_at_axis() else { continue };
+        let off = (found - cells).map(f64::round);
+        match known.iter_mut().find(|(t, _)| *t == track) {
+            Some((_, expected)) if *expected != off => {
+                tally.silent += 1;
+                eprintln!(
+                    "{} seed {} frame {k}: {connection:?} in count {track}, off by {:?}",
+                    scenario.name,
+                    scenario.seed,
+                    (off - *expected).as_slice()
+                );
+                *expected = off;
+            }
+            Some(_) => {}
+            None => known.push((track, off)),
+        }
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let numbers: Vec<u64> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let number = |k: usize, default: u64| numbers.get(k).copied().unwrap_or(default);
+    let (sequences, frames, first) = (number(0, 20), u32::try_from(number(1, 50))?, number(2, 1));
+    let mut tallies = [Tally::default(); KINDS.len()];
+    for seed in first..first + sequences {
+        for (kind, name) in KINDS.iter().enumerate() {
+            let mut scenario = sequence(kind, frames, seed);
+            scenario.name = (*name).to_owned();
+            run(&scenario, &mut tallies[kind])?;
+        }
+    }
+    println!("| kind | frames | steps above half a cell | refused | flagged | recognised again | silent slips |");
+    println!("|---|---|---|---|---|---|---|");
+    let mut all = Tally::default();
+    let row = |name: &str, t: &Tally| {
+        let share = |n: u32| format!("{n} ({:.1} %)", 100.0 * f64::from(n) / f64::from(t.frames.max(1)));
+        println!(
+            "| {name} | {} | {} | {} | {} | {} | {} |",
+            t.frames,
+            t.large_steps,
+            share(t.refused),
+            share(t.flagged),
+            t.recognised,
+            t.silent
+        );
+    };
+    for (name, t) in KINDS.iter().zip(&tallies) {
+        row(name, t);
+        all.frames += t.frames;
+        all.refused += t.refused;
+        all.flagged += t.flagged;
+        all.recognised += t.recognised;
+        all.silent += t.silent;
+        all.large_steps += t.large_steps;
+    }
+    row("all", &all);
+    Ok(())
+}
