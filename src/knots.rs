@@ -28,7 +28,15 @@ pub(crate) struct Knots {
     shifts: Vec<Option<Vector2<f64>>>,
 }
 
+/// Nodes that there is room for from the start: cells of a hundredth of the picture's width.
+const ROOM: usize = 8192;
+
 impl Knots {
+    /// Without a node yet.
+    pub fn new() -> Self {
+        Self { pixels: Vec::with_capacity(ROOM), shifts: Vec::with_capacity(ROOM), ..Self::default() }
+    }
+
     /// No node is known.
     pub fn clear(&mut self) {
         (self.columns, self.rows) = (0, 0);
@@ -146,7 +154,7 @@ mod tests {
             state: if k == 5 { JunctionState::Hidden } else { JunctionState::Seen },
         };
         let junctions: Vec<_> = (0..16).map(knot).collect();
-        let mut knots = Knots::default();
+        let mut knots = Knots::new();
         knots.fill(&junctions, sheet);
         for at in [Vector2::new(2.0, 2.0), Vector2::new(0.25, 1.5), Vector2::new(1.0, 1.0), Vector2::new(4.0, 2.0)] {
             let expected = at * 20.0 + Vector2::new(3.0, 0.0);

@@ -44,6 +44,9 @@ const FOLLOWED_COSINE: f64 = 0.99939;
 /// Longest time over which names are carried on without a velocity.
 const LONGEST_GAP_NS: i64 = 1_000_000_000;
 
+/// Twines that there is room for from the start.
+const TWINES: usize = 16384;
+
 /// Largest standard deviation of a prior, cells, that names nodes by itself: three of them are half a cell.
 const SURE_PRIOR_CELLS: f64 = 1.0 / 6.0;
 
@@ -107,8 +110,8 @@ impl LatticeMethod {
             last: None,
             flow_from: None,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
-            twines: Vec::new(),
-            knots: Knots::default(),
+            twines: Vec::with_capacity(TWINES),
+            knots: Knots::new(),
         })
     }
 
