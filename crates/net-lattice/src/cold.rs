@@ -44,9 +44,10 @@ impl Workspace {
             if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
                 break;
             }
-            let mut start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
-            let centre = self.seed(&mut start);
-            let Some(surface) = self.lock(&start, &COLD, centre) else { continue };
+            let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
+            let mut seeded = start;
+            let centre = self.seed(&mut seeded);
+            let Some(surface) = self.lock(&seeded, &COLD, centre) else { continue };
             self.measure::<false>(&surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
             let evidence = self.evidence();
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
@@ -64,7 +65,7 @@ impl Workspace {
         let lock = lock?;
         let lock = self.elsewhere(lock);
         let (lock, margin) = self.true_cell(lock)?;
-        self.stages = Some(Stages::new(&lock));
+        self.stages = Some(Stages::new(&lock.start, &lock.surface));
         self.finish(config, lock, margin)
     }
     fn search(&mut self) {

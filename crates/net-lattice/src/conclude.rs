@@ -28,7 +28,7 @@ impl Workspace {
     ) -> Option<LatticeEstimate> {
         let (fit, robust) = self.likelihood(surface, lock, model, passes)?;
         let surface = fit.surface;
-        let labels = labels.unwrap_or_else(|| cold_labels(&surface));
+        let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
         let count = model.parameters();
         let reach =
             REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
@@ -108,37 +108,6 @@ impl Workspace {
         }
         Plane { normal, distance: normal.dot(&mean) }
     }
-}
-
-/// X nearest to the image's u axis, origin at the node nearest to the optical axis.
-pub(crate) fn cold_labels(surface: &Surface) -> Labels {
-    let d = 0.5 * (std::f64::consts::FRAC_PI_2 - surface.angle);
-    let (sd, cd) = d.sin_cos();
-    let (e1, e2) = (surface.rotation.column(0), surface.rotation.column(1));
-    let u1 = e1[0] * cd + e2[0] * sd;
-    let u2 = e1[0] * sd + e2[0] * cd;
-    let turns = if u1.abs() >= u2.abs() {
-        if u1 >= 0.0 { 0 } else { 2 }
-    } else if u2 >= 0.0 {
-        1
-    } else {
-        3
-    };
-    // In a rhomb the nearest node need not be the one whose coordinates round to it.
-    let base = [surface.offset[0].round(), surface.offset[1].round()];
-    let mut best = (f64::INFINITY, base);
-    for i in -1..=1 {
-        for j in -1..=1 {
-            let node = [base[0] + f64::from(i), base[1] + f64::from(j)];
-            let p = (node[0] - surface.offset[0]) * surface.sides[0];
-            let q = (node[1] - surface.offset[1]) * surface.sides[1];
-            let distance = p * p + q * q + 2.0 * p * q * surface.angle.cos();
-            if distance < best.0 - 1e-15 {
-                best = (distance, node);
-            }
-        }
-    }
-    Labels { turns, origin: best.1 }
 }
 
 /// Principal curvatures on the axis, larger magnitude first. The normal points away from the camera, so a positive height is farther away.

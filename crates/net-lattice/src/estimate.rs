@@ -62,6 +62,37 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
+    /// X nearest to the image's u axis, origin at the node nearest to the optical axis.
+    pub(crate) fn nearest(surface: &Surface) -> Self {
+        let d = 0.5 * (std::f64::consts::FRAC_PI_2 - surface.angle);
+        let (sd, cd) = d.sin_cos();
+        let (e1, e2) = (surface.rotation.column(0), surface.rotation.column(1));
+        let u1 = e1[0] * cd + e2[0] * sd;
+        let u2 = e1[0] * sd + e2[0] * cd;
+        let turns = if u1.abs() >= u2.abs() {
+            if u1 >= 0.0 { 0 } else { 2 }
+        } else if u2 >= 0.0 {
+            1
+        } else {
+            3
+        };
+        // In a rhomb the nearest node need not be the one whose coordinates round to it.
+        let base = [surface.offset[0].round(), surface.offset[1].round()];
+        let mut best = (f64::INFINITY, base);
+        for i in -1..=1 {
+            for j in -1..=1 {
+                let node = [base[0] + f64::from(i), base[1] + f64::from(j)];
+                let p = (node[0] - surface.offset[0]) * surface.sides[0];
+                let q = (node[1] - surface.offset[1]) * surface.sides[1];
+                let distance = p * p + q * q + 2.0 * p * q * surface.angle.cos();
+                if distance < best.0 - 1e-15 {
+                    best = (distance, node);
+                }
+            }
+        }
+        Self { turns, origin: best.1 }
+    }
+
     /// Internal coordinates to (i, j).
     pub(crate) fn net_from_sheet(&self, s: [f64; 2]) -> Vector2<f64> {
         let (p, q) = (s[0] - self.origin[0], s[1] - self.origin[1]);

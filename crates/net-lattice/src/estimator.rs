@@ -4,6 +4,7 @@ use net_image::GrayView;
 use crate::config::Config;
 use crate::error::Result;
 use crate::estimate::LatticeEstimate;
+use crate::stages::Stages;
 use crate::view::View;
 use crate::workspace::Workspace;
 
@@ -74,6 +75,11 @@ impl LatticeEstimator {
         if let Some(work) = &mut self.work {
             work.last = Some(estimate.followed());
         }
+    }
+
+    /// The stages of the last picture. `None` if it was not a cold start, or nothing periodic was found.
+    pub fn stages(&self) -> Option<&Stages> {
+        self.work.as_ref()?.stages.as_ref()
     }
 
     /// Forgets the last picture.

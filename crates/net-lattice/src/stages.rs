@@ -2,10 +2,8 @@
 
 use net_geometry::Pose;
 
-use crate::conclude::cold_labels;
-use crate::estimator::LatticeEstimator;
+use crate::estimate::Labels;
 use crate::surface::Surface;
-use crate::workspace::Lock;
 
 /// The poses that the likelihood's answer came from, in the conventions of [`LatticeEstimate::pose`](crate::LatticeEstimate::pose): at the
 /// tangent plane on the optical axis. Origins are the nodes nearest to the axis, each stage's own.
@@ -19,15 +17,9 @@ pub struct Stages {
 }
 
 impl Stages {
-    pub(crate) fn new(lock: &Lock) -> Self {
-        let pose = |surface: &Surface| cold_labels(surface).pose(surface);
-        Self { wave_vectors: pose(&lock.start), lock_in: pose(&lock.surface) }
-    }
-}
-
-impl LatticeEstimator {
-    /// The stages of the last picture. `None` if it was not a cold start, or nothing periodic was found.
-    pub fn stages(&self) -> Option<&Stages> {
-        self.work.as_ref()?.stages.as_ref()
+    /// From what the search gave, and what that was locked to.
+    pub(crate) fn new(hypothesis: &Surface, locked: &Surface) -> Self {
+        let pose = |surface: &Surface| Labels::nearest(surface).pose(surface);
+        Self { wave_vectors: pose(hypothesis), lock_in: pose(locked) }
     }
 }
