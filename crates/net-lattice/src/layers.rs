@@ -24,7 +24,7 @@ impl LatticeEstimator {
     /// another. Which of the two is in front their ranges tell. The probability is that of any estimate, times the chance that it is no
     /// remainder of the first. `None` when nothing periodic is left, or the first hides too much to tell.
     ///
-    /// Takes as long as a cold start, and changes nothing about what [`LatticeEstimator::update`] follows.
+    /// Takes as long as a cold start, allocates, and changes nothing about what [`LatticeEstimator::update`] follows.
     ///
     /// # Errors
     /// [`crate::Error::Geometry`] when the picture's size is not the camera's.
