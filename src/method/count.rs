@@ -28,6 +28,8 @@ pub(super) struct Counted {
     /// To be added to the names that it came with.
     pub cells: (i32, i32),
     pub connection: Connection,
+    /// Whether the vote was certain.
+    pub proven: bool,
 }
 
 /// The map of the count before, for a place that may be recognised.
@@ -85,8 +87,9 @@ impl CellCount {
             self.vote.reset();
         }
         let vote = self.vote.update(image, middle, pixel_from_lattice);
-        let counted = self.judge(&vote, middle, naming);
-        if vote.verdict == Verdict::Decided || counted.connection != Connection::Followed {
+        let proven = vote.verdict == Verdict::Decided;
+        let counted = Counted { proven, ..self.judge(&vote, middle, naming) };
+        if proven || counted.connection != Connection::Followed {
             // Frames in doubt have no place in the map.
             self.vote.remember(&mut self.map);
         }
@@ -95,7 +98,7 @@ impl CellCount {
     }
 
     fn judge(&mut self, vote: &VoteResult, middle: (i32, i32), naming: Naming) -> Counted {
-        let told = |cells, connection| Counted { cells, connection };
+        let told = |cells, connection| Counted { cells, connection, proven: false };
         match (naming, vote.correction()) {
             (Naming::New, _) => self.find_or_restart(minus(self.middle, middle)),
             (Naming::Guess, None) => self.find_or_restart((0, 0)),
@@ -114,7 +117,7 @@ impl CellCount {
     fn find_or_restart(&mut self, around: (i32, i32)) -> Counted {
         if let Some(place) = self.vote.recall(&mut self.map, around).filter(|r| r.recognised) {
             self.vote.renumber(place.cells);
-            return Counted { cells: place.cells, connection: Connection::Recognised };
+            return Counted { cells: place.cells, connection: Connection::Recognised, proven: false };
         }
         if let Some(before) = self.before
             && let Some(counted) = self.go_back(before)
@@ -124,7 +127,8 @@ impl CellCount {
         }
         let first = self.next == 0;
         self.restart(around);
-        Counted { cells: (0, 0), connection: if first { Connection::Started } else { Connection::Restarted } }
+        let connection = if first { Connection::Started } else { Connection::Restarted };
+        Counted { cells: (0, 0), connection, proven: false }
     }
 
     fn restart(&mut self, around: (i32, i32)) {
@@ -139,7 +143,7 @@ impl CellCount {
 
     /// A young count may be the one before.
     fn look_up(&mut self) -> Counted {
-        let mut counted = Counted { cells: (0, 0), connection: Connection::Followed };
+        let mut counted = Counted { cells: (0, 0), connection: Connection::Followed, proven: false };
         let Some(mut before) = self.before.take() else { return counted };
         before.age += 1;
         if before.age.is_multiple_of(LOOK_UP_EVERY)
@@ -158,7 +162,7 @@ impl CellCount {
         self.vote.renumber(place.cells);
         std::mem::swap(&mut self.map, &mut self.map_before);
         self.track = before.track;
-        Some(Counted { cells: place.cells, connection: Connection::Recognised })
+        Some(Counted { cells: place.cells, connection: Connection::Recognised, proven: false })
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) struct LatticeMethod {
     last: Option<(i64, LatticeEstimate)>,
     /// When the frame was taken that the flow starts from, if its answer was vouched for.
     flow_from: Option<i64>,
+    /// Whether the velocity spans a count begun anew that nothing has proved since.
+    velocity_in_doubt: bool,
     adjuster: NetAdjuster,
     /// Twines of the last answer, and where its lattice is by the knots that were measured.
     twines: Vec<Twine>,
@@ -109,6 +111,7 @@ impl LatticeMethod {
             flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
             last: None,
             flow_from: None,
+            velocity_in_doubt: false,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
             twines: Vec::with_capacity(TWINES),
             knots: Knots::new(),
@@ -175,7 +178,7 @@ impl LatticeMethod {
         });
         // Over frames without a pose a velocity is a guess.
         let gapless = self.last.as_ref().is_some_and(|(then, _)| self.flow_from == Some(*then));
-        let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, naming(gapless)));
+        let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, naming(gapless && !self.velocity_in_doubt)));
         let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
         let flowed = recent
             .zip(flow)
@@ -201,10 +204,15 @@ impl LatticeMethod {
         let middle = SheetMap { estimate: &estimate, camera }.seed().unwrap_or_default();
         let knots = &self.knots;
         let counted = self.count.update(image, middle, naming, |ij| knots.pixel(ij));
-        if !matches!(counted.connection, Connection::Followed) {
+        if counted.connection == Connection::Restarted && naming == Naming::Guess && counted.cells == (0, 0) {
+            // Names go on by the best guess. So does the velocity: it makes better guesses, but is none to rely on.
+            self.velocity_in_doubt = true;
+        } else if counted.connection != Connection::Followed {
             // What was renamed has no velocity: the change of names would look like one.
             self.motion = Motion::default();
+            self.velocity_in_doubt = false;
         }
+        self.velocity_in_doubt &= !counted.proven;
         if counted.cells == (0, 0) {
             return (estimate, counted.connection);
         }
