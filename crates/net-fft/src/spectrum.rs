@@ -105,11 +105,11 @@ fn weighted_sum<T: Copy + Into<f32>>(row: &[T], weights: &[f32]) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    fn spectrum_of(width: usize, height: usize, value: impl Fn(f64, f64) -> f64) -> HalfSpectrum {
+    pub(crate) fn spectrum_of(width: usize, height: usize, value: impl Fn(f64, f64) -> f64) -> HalfSpectrum {
         let data: Vec<f32> =
             (0..width * height).map(|i| value((i % width) as f64, (i / width) as f64) as f32).collect();
         let mut out = HalfSpectrum::default();

@@ -145,16 +145,7 @@ fn blur(image: &[u8], width: usize, out: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::{SpectrumPlan, Window};
-
-    fn spectrum_of(width: usize, height: usize, value: impl Fn(f64, f64) -> f64) -> HalfSpectrum {
-        let data: Vec<f32> =
-            (0..width * height).map(|i| value((i % width) as f64, (i / width) as f64) as f32).collect();
-        let mut out = HalfSpectrum::default();
-        let mut plan = SpectrumPlan::new(width, height, Window::Hann).expect("a size above zero");
-        plan.transform(View::packed(&data, width, height).expect("a whole image"), &mut out).expect("the planned size");
-        out
-    }
+    use crate::spectrum::tests::spectrum_of;
 
     #[test]
     fn the_picture_of_all_bins_is_shifted_and_symmetric() {
