@@ -24,14 +24,23 @@ const COLD: [(f64, Model); 7] = [
     (2000.0, Model::Quartic),
     (2000.0, Model::Quartic),
 ];
-/// The short lock-in of a rival period.
-const RIVAL: [(f64, Model); 2] = [(110.0, Model::Rhomb), (250.0, Model::Quadratic)];
 /// Rival depths: scaling depth by m scales every phase by m.
-const RIVALS: [f64; 9] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
+const RIVALS: [f64; 12] = [1.0 / 7.0, 1.0 / 6.0, 0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 
 /// Tilt from which a lock-in is tried again, rad.
+/// Agreeing tiles without which all of the picture tells between rival periods.
+const FEWEST: usize = 4;
+/// Coherence of both families that leaves no doubt. Forty tiles in perfect step have 8.9.
+const SURE: f64 = 5.5;
+/// Share of a candidate's score below which another is nothing beside it.
+const PART: f64 = 0.45;
+/// Candidates that are looked through for a second net.
+const MOST: usize = 12;
+/// How often the period may change.
+const PERIODS: usize = 3;
+
 const OTHER: f64 = 0.16;
 
 impl Workspace {
@@ -39,35 +48,51 @@ impl Workspace {
         self.search();
         let mut locks = std::mem::take(&mut self.locks);
         locks.clear();
-        for k in 0..self.candidates.len().min(CANDIDATES.1) {
+        // A net in which nearly every tile agrees. Its periods are tested below, and what scores far less is nothing beside it; a second net is neither.
+        let mut settled: Option<(Surface, f64)> = None;
+        for k in 0..self.candidates.len() {
             let c = self.candidates[k];
-            if k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0) {
+            let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
+            if let Some((net, score)) = &settled {
+                if k >= MOST || c.score < PART * score || same_but_for_period(&start, net) {
+                    continue;
+                }
+            } else if k >= CANDIDATES.1
+                || k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0)
+            {
                 break;
             }
-            let start = Surface::flat(c.rotation, c.depth, c.angle, self.scope.sides);
             let mut seeded = start;
-            let centre = self.seed(&mut seeded);
-            let Some(surface) = self.lock(&seeded, &COLD, centre) else { continue };
-            self.measure::<false>(&surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
+            let seed = self.seed(&mut seeded);
+            let Some(surface) = self.lock(&seeded, &COLD, seed) else { continue };
+            self.measure_comb(&surface, self.scale_for(surface.depth), seed.polarity, &Window::ALL);
             let evidence = self.evidence();
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
             let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
-            locks.push(Lock { surface, start, centre, evidence, gain, polarity, blur });
-            // Nearly every tile agrees: other candidates could only be other periods, which are tested below.
+            locks.push(Lock { score: c.score, above: c.above, surface, start, seed, evidence, gain, polarity, blur });
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
-            if coherence > 0.8 && evidence.good > 0.9 {
+            if settled.is_none() && coherence > 0.8 && evidence.good > 0.9 {
+                settled = Some((surface, c.score));
+            }
+        }
+        let lock = Self::best_lock(&locks);
+        self.locks = locks;
+        let mut lock = self.elsewhere(lock?);
+        // A rival may have rivals of its own: from the third harmonic of a net half as far as it, say.
+        let mut margin = 1.0;
+        for _ in 0..PERIODS {
+            let m;
+            (lock, m, margin) = self.true_cell(lock)?;
+            if m == 1.0 {
                 break;
             }
         }
-        let lock = self.best_lock(&mut locks);
-        self.locks = locks;
-        let lock = lock?;
-        let lock = self.elsewhere(lock);
-        let (lock, margin) = self.true_cell(lock)?;
+        self.seat(&mut lock);
         self.stages = Some(Stages::new(&lock.start, &lock.surface));
         self.finish(config, lock, margin)
     }
+
     fn search(&mut self) {
         let (found, refined) = (&mut self.found, &mut self.candidates);
         refined.clear();
@@ -79,21 +104,30 @@ impl Workspace {
             found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
             let range = search.depths_m(self.scope.sides[0]);
             search::add_rivals(bank, scale, &self.scope, range, found);
+            self.background.measure(search, bank, scale, &self.scope);
+            for c in found.iter_mut() {
+                c.above = self.background.above(c);
+            }
             refined.append(found);
         }
         search::distinct(refined);
+        search::interleave(refined);
     }
 
-    /// Gain decides between periods, coherence between candidates of the same period: a cycle slip at the rim costs coherence, hardly gain.
-    fn best_lock(&self, locks: &mut [Lock]) -> Option<Lock> {
-        let v = |l: &Lock| l.evidence.v[0].abs().min(l.evidence.v[1].abs());
-        let score = |l: &Lock| l.gain * if v(l) > 3.5 { 1.0 } else { 0.05 };
-        locks.sort_by(|a, b| score(b).total_cmp(&score(a)));
-        let top = *locks.first()?;
-        let same =
-            locks.iter().filter(|l| (l.surface.depth / top.surface.depth).ln().abs() < 0.06 && l.gain > 0.6 * top.gain);
+    /// Between lattices that are there beyond doubt, two nets or periods of one, the drawing's gain decides. What a fish or a shadow is explained by counts
+    /// for nothing, so in doubt it is how high a candidate stood in the search, how far above its background, and how well the tiles agree.
+    fn best_lock(locks: &[Lock]) -> Option<Lock> {
+        let v = |l: &Lock| l.evidence.v[0].min(l.evidence.v[1]);
+        let sure = || locks.iter().filter(|l| v(l) > SURE);
+        if let Some(top) = sure().max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            // Of two nets the nearer one is what a vehicle drifts into.
+            let another = |l: &&Lock| !same_but_for_period(&l.surface, &top.surface) && l.gain > PART * top.gain;
+            let nearest = sure().filter(another).min_by(|a, b| a.surface.depth.total_cmp(&b.surface.depth));
+            return Some(*nearest.filter(|l| l.surface.depth < top.surface.depth).unwrap_or(top));
+        }
         let coherence = |l: &Lock| v(l) + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());
-        same.max_by(|a, b| coherence(a).total_cmp(&coherence(b))).copied()
+        let merit = |l: &Lock| 0.3 * l.score + 0.5 * l.above + coherence(l);
+        locks.iter().max_by(|a, b| merit(a).total_cmp(&merit(b))).copied()
     }
 
     /// Locks again from other tilts about the one found, and keeps what agrees best. Bent sheets have more than one tilt from which the phases
@@ -104,9 +138,9 @@ impl Workspace {
             return best;
         }
         let first = best;
-        let mut top = self.agreement(&first.surface).0;
+        let mut top = self.agreement(&first.surface, first.seed.polarity).0;
         if let Some(surface) = self.counted_out(&first) {
-            let (score, evidence) = self.agreement(&surface);
+            let (score, evidence) = self.agreement(&surface, first.seed.polarity);
             if score > top {
                 top = score;
                 best = Lock { surface, evidence, ..first };
@@ -120,15 +154,15 @@ impl Workspace {
                 continue;
             }
             let mut start = Surface::flat(rotation, s.depth, s.angle, s.sides);
-            let centre = self.seed(&mut start);
-            let Some(surface) = self.lock(&start, &COLD, centre) else { continue };
+            let seed = self.seed(&mut start);
+            let Some(surface) = self.lock(&start, &COLD, seed) else { continue };
             if (surface.depth / first.surface.depth).ln().abs() > 0.06 {
                 continue;
             }
-            let (score, evidence) = self.agreement(&surface);
+            let (score, evidence) = self.agreement(&surface, seed.polarity);
             if score > top {
                 top = score;
-                best = Lock { surface, centre, evidence, ..first };
+                best = Lock { surface, seed, evidence, ..first };
             }
         }
         best
@@ -137,7 +171,7 @@ impl Workspace {
     /// The sheet fitted to phases whose whole cycles are counted from tile to tile, and locked again.
     fn counted_out(&mut self, lock: &Lock) -> Option<Surface> {
         let place = self.scale_for(lock.surface.depth);
-        self.measure::<false>(&lock.surface, place, 1.0, &Window::ALL);
+        self.measure_comb(&lock.surface, place, lock.seed.polarity, &Window::ALL);
         let t = &mut self.tools;
         t.unwrapper.run(&t.measurements, self.view.levels[place.0].tiles[place.1].nx);
         t.observations.clear();
@@ -150,20 +184,19 @@ impl Workspace {
         }
         let robust = Robust::Family(0.25);
         let fit = t.fitter.fit(&lock.surface, Model::Quartic.parameters(), &t.observations, robust, &self.prior, 5)?;
-        self.lock(&fit.surface, &COLD[5..], lock.centre)
+        self.lock(&fit.surface, &COLD[5..], lock.seed)
     }
 
-    /// How well the tiles agree with a locked sheet, in both harmonics; the second is never fitted.
-    fn agreement(&mut self, surface: &Surface) -> (f64, Evidence) {
-        self.measure::<true>(surface, self.scale_for(surface.depth), 1.0, &Window::ALL);
+    /// How well the tiles agree with a locked sheet.
+    fn agreement(&mut self, surface: &Surface, polarity: Polarity) -> (f64, Evidence) {
+        self.measure_comb(surface, self.scale_for(surface.depth), polarity, &Window::ALL);
         let e = self.evidence();
         // Range and normal are claimed on the axis: what agrees there counts twice.
-        let harmonics = e.v[0].min(e.v[1]) + e.v2[0].abs().min(e.v2[1].abs());
-        (harmonics * (1.0 + e.good_near), e)
+        (e.v[0].min(e.v[1]) * (1.0 + e.good_near), e)
     }
 
     /// Tests the rival periods; returns the best, and the share of its gain by which the second falls short.
-    fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64)> {
+    fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64, f64)> {
         let cell = self.short_px(lock.surface.depth);
         let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
         let smallest = SMALLEST_CELL * 0.9 * self.view.reduction as f64;
@@ -174,29 +207,32 @@ impl Workspace {
         // The best and the second of them by gain, with the rival's period.
         let mut best: Option<(f64, f64, Lock)> = None;
         let (mut second, mut tested) = (0.0, 0);
+        // Rivals share the tiles in which this lattice is: what a drawing explains of a fish must not tell between them.
+        let tiling = self.view.tiling_for(self.cell_px(lock.surface.depth));
+        self.measure_comb(&lock.surface, (level, tiling), lock.seed.polarity, &Window::ALL);
+        let t = &mut self.tools;
+        t.tiling = tiling;
+        t.mask.clear();
+        t.mask.extend(t.measurements.iter().map(|m| m.aligned()));
+        if t.mask.iter().filter(|m| **m).count() < FEWEST {
+            t.mask.clear();
+        }
         let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
         for m in RIVALS.into_iter().filter(possible) {
-            let mut centre = lock.centre;
-            let surface = if m == 1.0 {
-                lock.surface
-            } else {
-                let mut start = lock.surface.scaled(m);
-                centre = self.seed(&mut start);
-                let Some(s) = self.lock(&start, &RIVAL, centre) else { continue };
-                let v = self.evidence().v;
-                // Waves of that period are not there at all.
-                if v[0].min(v[1]) < 1.0 {
-                    continue;
-                }
-                s
-            };
+            let mut seed = lock.seed;
+            let mut surface = lock.surface;
+            if m != 1.0 {
+                surface = lock.surface.scaled(m);
+                let Some(polarity) = self.slide(&mut surface, level) else { continue };
+                seed.polarity = polarity;
+            }
             let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
             // A lattice of which only every second or third line is there draws most of the picture, too.
             let place = (level, self.view.tiling_for(self.cell_px(surface.depth)));
-            self.measure::<false>(&surface, place, 1.0, &Window::ALL);
+            self.measure_comb(&surface, place, seed.polarity, &Window::ALL);
             let all_there = 1.0 - (2.0 * self.fold(&surface, place).unlike).min(1.0);
             let worth = gain * if gain > 0.0 { all_there } else { 1.0 };
-            let rival = Lock { surface, start: lock.start.scaled(m), centre, gain, polarity, blur, ..lock };
+            let rival = Lock { surface, start: lock.start.scaled(m), seed, gain, polarity, blur, ..lock };
             match &best {
                 Some((top, ..)) if worth <= *top => second = if tested == 1 { worth } else { f64::max(second, worth) },
                 before => {
@@ -208,22 +244,27 @@ impl Workspace {
         }
         let (gain, m, mut best) = best?;
         if m != 1.0
-            && let Some(s) = self.lock(&best.surface, &COLD[2..], best.centre)
+            && let Some(s) = self.lock(&best.surface, &COLD[2..], best.seed)
         {
             best.surface = s;
         }
+        self.tools.mask.clear();
+        Some((best, m, (gain - second) / gain.abs().max(1e-9)))
+    }
+
+    /// From where the lock-in has bright twine to where twine is. One family can sit half a cell off when the other decided the polarity: the
+    /// drawing tells.
+    fn seat(&mut self, best: &mut Lock) {
         if best.polarity == Polarity::Dark {
             best.surface.offset.iter_mut().for_each(|o| *o += 0.5);
         }
-        self.seat_families(&mut best, level, widest);
-        Some((best, (gain - second) / gain.abs().max(1e-9)))
-    }
-
-    /// One family can sit half a cell off when the other decided the polarity: the drawing tells.
-    fn seat_families(&mut self, best: &mut Lock, level: usize, widest: f64) {
+        let level = self.view.level_for(self.short_px(best.surface.depth), 6.0);
+        let widest = self.cell_px(best.surface.depth);
         self.high(level, widest);
         let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
         drawing.sparse = true;
+        self.tools.likelihood.load(&self.view.levels[level]);
+        self.tools.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
         let mut top = (f64::NEG_INFINITY, best.surface);
         for shift in [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]] {
             let mut surface = best.surface;
@@ -231,7 +272,8 @@ impl Workspace {
             surface.offset[1] += shift[1];
             let t = &mut self.tools;
             t.map.fill(&surface, &self.view.levels[level]);
-            let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother);
+            let gain =
+                t.likelihood.gain(&t.map, &drawing, &self.view.levels[level].tiles[t.tiling], &t.mask, &mut t.smoother);
             if gain > top.0 {
                 top = (gain, surface);
             }
@@ -255,4 +297,15 @@ impl Workspace {
         }
         self.conclude(config, &surface, &lock, model, 2, margin, None)
     }
+}
+
+/// Whether two lattices may be one net seen with different periods: the same plane, at depths at which harmonics coincide.
+fn same_but_for_period(a: &Surface, b: &Surface) -> bool {
+    /// What the search leaves open, rad and as part of the depth.
+    const TURN: f64 = 0.07;
+    const DEPTH: f64 = 0.03;
+    let turned = a.normal().angle(&b.normal());
+    let simple = |m: u8, n: u8| m == 1 || n == 1 || m + n <= 5;
+    let coincide = |m: u8, n: u8| (a.depth * f64::from(n) / (b.depth * f64::from(m)) - 1.0).abs() < DEPTH;
+    turned < TURN && (1..=7).any(|m| (1..=7).any(|n| simple(m, n) && coincide(m, n)))
 }

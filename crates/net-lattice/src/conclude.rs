@@ -5,8 +5,8 @@ use net_geometry::nalgebra::{Matrix3, Vector3};
 
 use crate::config::Config;
 use crate::covariance;
+use crate::decision::Evidence;
 use crate::estimate::{Labels, LatticeEstimate};
-use crate::lockin::Window;
 use crate::model::{self, Model};
 use crate::surface::Surface;
 use crate::workspace::{Lock, Workspace};
@@ -48,10 +48,10 @@ impl Workspace {
         );
         let errors = covariance::pose(&surface, &labels, &c, count);
         let place = self.scale_for(surface.depth);
-        self.measure::<true>(&surface, place, f64::from(lock.polarity.sign()), &Window::ALL);
-        let evidence = self.evidence();
+        let evidence = self.weigh(&surface, place, lock.polarity);
         let mean_plane = self.mean_plane(&surface);
         let evidence = evidence.folded(self.fold(&surface, place));
+        let evidence = Evidence { above: lock.above, ..evidence };
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {

@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::estimate::LatticeEstimate;
 use crate::likelihood::Polarity;
 use crate::model::Model;
-use crate::workspace::{Lock, Workspace};
+use crate::workspace::{Lock, Seed, Workspace};
 
 impl Workspace {
     /// The sheet of the last picture, moved as predicted, locked and refined.
@@ -19,13 +19,16 @@ impl Workspace {
         let half = if last.polarity == Polarity::Dark { 0.5 } else { 0.0 };
         let mut surface = start;
         surface.offset = start.offset.map(|o| o - half);
+        let seed = Seed { centre: self.view.centre, polarity: last.polarity };
         let model = last.model.max(Model::Rhomb);
-        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], self.view.centre)?;
+        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], seed)?;
         surface.offset = surface.offset.map(|o| o + half);
         let lock = Lock {
+            score: 0.0,
+            above: 0.0,
             surface,
             start,
-            centre: self.view.centre,
+            seed,
             evidence: last.evidence,
             gain: last.gain * self.view.levels[0].raw.data().len() as f64,
             polarity: last.polarity,

@@ -43,6 +43,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod cold;
+mod comb;
 mod conclude;
 mod config;
 mod covariance;

@@ -199,7 +199,14 @@ impl Likelihood {
     }
 
     /// Robust log-likelihood gain of the drawing over an empty picture (Cauchy noise), natural units.
-    pub(crate) fn gain(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) -> f64 {
+    pub(crate) fn gain(
+        &mut self,
+        map: &PhaseMap,
+        drawing: &Drawing,
+        grid: &TileGrid,
+        mask: &[bool],
+        smoother: &mut Smoother,
+    ) -> f64 {
         self.draw::<false>(map, drawing, smoother);
         self.fit_amplitude(drawing, smoother);
         let per = 1.0 / (1.5 * self.noise);
@@ -207,6 +214,10 @@ impl Likelihood {
         for b in 0..self.used.len() {
             let a = self.amplitude.data()[b];
             if !self.used[b] || a == 0.0 {
+                continue;
+            }
+            let tile = usize::from(grid.row[b / self.blocks_x]) * grid.nx + usize::from(grid.column[b % self.blocks_x]);
+            if mask.get(tile) == Some(&false) {
                 continue;
             }
             let mut sum = 0.0;

@@ -1,5 +1,6 @@
 //! Lock-in: the picture multiplied by the predicted waves and summed over tiles. What phase is left over says where the lattice really is.
 
+use crate::comb::{Comb, HARMONICS};
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::{quantile, sin_cos_cycles};
 use crate::surface::{Point, Surface};
@@ -8,10 +9,8 @@ use crate::view::{BLOCK, Level, Site, View};
 /// Sums over one tile.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TileSum {
-    /// Demodulated sums of both families, real and imaginary, at the wave asked for.
-    pub z: [[f64; 2]; 2],
-    /// The same at twice its frequency.
-    pub z2: [[f64; 2]; 2],
+    /// Demodulated sums of both families by harmonic, real and imaginary.
+    pub z: [[[f64; 2]; HARMONICS]; 2],
     /// Sum of squares, clipped.
     pub power: f64,
     /// The same without clipping.
@@ -50,6 +49,15 @@ impl Measurement {
     }
 }
 
+/// What tells where a tile's twines are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Probe {
+    /// The fundamental, and the second harmonic by itself; 1 for bright twine, -1 for dark.
+    Waves(f64),
+    /// All harmonics together.
+    Comb(Comb),
+}
+
 /// Which part of the picture a lock-in looks at.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Window {
@@ -73,8 +81,8 @@ impl Window {
 /// Weight below which tiles are not looked at.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// Demodulates `high` of a level over its tiles. `SECOND`: the second harmonic as well.
-pub(crate) fn demodulate<const SECOND: bool>(
+/// Demodulates `thin` of a level over its tiles, by all harmonics.
+pub(crate) fn demodulate(
     level: &Level,
     tiling: usize,
     map: &PhaseMap,
@@ -94,60 +102,87 @@ pub(crate) fn demodulate<const SECOND: bool>(
         let mut x = 0;
         while x < bx {
             let tx = usize::from(grid.column[x]);
-            if window.weight(sites[tx].pixel) < NEGLIGIBLE {
-                while x < bx && usize::from(grid.column[x]) == tx {
-                    x += 1;
-                }
-                continue;
-            }
-            let tile = &mut tiles[tx];
+            let looked_at = window.weight(sites[tx].pixel) >= NEGLIGIBLE;
+            let mut run = Run::default();
             while x < bx && usize::from(grid.column[x]) == tx {
-                if let Some(planes) = map.block(x, y) {
-                    let pixels = std::array::from_fn(|r| std::array::from_fn(|c| rows[r][x * BLOCK + c]));
-                    accumulate::<SECOND>(&pixels, gain, &planes, tile);
+                if let Some(planes) = looked_at.then(|| map.block(x, y)).flatten() {
+                    let pixels = std::array::from_fn(|r| std::array::from_fn(|c| gain * rows[r][x * BLOCK + c]));
+                    run.add(&pixels, &planes);
                 }
                 x += 1;
             }
+            run.flush(&mut tiles[tx]);
         }
     }
 }
 
-/// One block's share.
-#[inline]
-fn accumulate<const SECOND: bool>(pixels: &[[f32; 4]; 4], gain: f32, planes: &[Plane; 2], tile: &mut TileSum) {
-    let p = pixels.map(|row| row.map(|i| i * gain));
-    tile.whole += f64::from(p.iter().flatten().map(|p| p * p).sum::<f32>());
-    let p = p.map(|row| row.map(|i| i.clamp(-1.0, 1.0)));
-    let power: f32 = p.iter().flatten().map(|p| p * p).sum();
-    tile.power += f64::from(power);
-    tile.count += (BLOCK * BLOCK) as f64;
-    for (f, w) in planes.iter().enumerate() {
-        let (s, c) = sin_cos_cycles(w.s);
-        let first = wave(&p, w.du, w.dv);
-        tile.z[f][0] += f64::from(first.0 * c + first.1 * s);
-        tile.z[f][1] += f64::from(first.1 * c - first.0 * s);
-        if SECOND {
-            let (s2, c2) = (2.0 * s * c, 1.0 - 2.0 * s * s);
-            let second = wave(&p, 2.0 * w.du, 2.0 * w.dv);
-            tile.z2[f][0] += f64::from(second.0 * c2 + second.1 * s2);
-            tile.z2[f][1] += f64::from(second.1 * c2 - second.0 * s2);
+/// Both families' harmonics side by side: first family's 1, 2, ..., second family's.
+const LANES: usize = 2 * HARMONICS;
+type Lanes = [f32; LANES];
+
+/// Sums over the blocks of one tile in one row of blocks.
+#[derive(Default)]
+struct Run {
+    re: Lanes,
+    im: Lanes,
+    power: f32,
+    whole: f32,
+    blocks: u32,
+}
+
+impl Run {
+    fn add(&mut self, pixels: &[[f32; BLOCK]; BLOCK], planes: &[Plane; 2]) {
+        self.whole += pixels.iter().flatten().map(|p| p * p).sum::<f32>();
+        let p = pixels.map(|row| row.map(|i| i.clamp(-1.0, 1.0)));
+        self.power += p.iter().flatten().map(|p| p * p).sum::<f32>();
+        self.blocks += 1;
+        // Sums and differences of the columns right and left of the middle, inner and outer; then the same of the rows.
+        let e = p.map(|r| [r[1] + r[2], r[0] + r[3], r[1] - r[2], r[0] - r[3]]);
+        let of = |f: &dyn Fn(usize) -> f32| -> [f32; 4] { std::array::from_fn(f) };
+        let (even1, even3) = (of(&|k| e[1][k] + e[2][k]), of(&|k| e[0][k] + e[3][k]));
+        let (odd1, odd3) = (of(&|k| e[1][k] - e[2][k]), of(&|k| e[0][k] - e[3][k]));
+        // Half a pixel and one and a half off the middle.
+        let (su1, cu1) = multiples(planes.each_ref().map(|w| 0.5 * w.du));
+        let (sv1, cv1) = multiples(planes.each_ref().map(|w| 0.5 * w.dv));
+        let (s, c) = multiples(planes.each_ref().map(|w| w.s));
+        for l in 0..LANES {
+            let triple = |s: f32, c: f32| (s * (3.0 - 4.0 * s * s), c * (4.0 * c * c - 3.0));
+            let ((su3, cu3), (sv3, cv3)) = (triple(su1[l], cu1[l]), triple(sv1[l], cv1[l]));
+            let even = |m: &[f32; 4]| m[0] * cu1[l] + m[1] * cu3;
+            let odd = |m: &[f32; 4]| m[2] * su1[l] + m[3] * su3;
+            // Rows above the middle carry exp(+j a), those below exp(-j a).
+            let re = even(&even1) * cv1[l] + even(&even3) * cv3 - odd(&odd1) * sv1[l] - odd(&odd3) * sv3;
+            let im = odd(&even1) * cv1[l] + odd(&even3) * cv3 + even(&odd1) * sv1[l] + even(&odd3) * sv3;
+            self.re[l] += re * c[l] + im * s[l];
+            self.im[l] += im * c[l] - re * s[l];
         }
+    }
+
+    fn flush(&self, tile: &mut TileSum) {
+        for (l, (re, im)) in self.re.iter().zip(&self.im).enumerate() {
+            let z = &mut tile.z[l / HARMONICS][l % HARMONICS];
+            z[0] += f64::from(*re);
+            z[1] += f64::from(*im);
+        }
+        tile.power += f64::from(self.power);
+        tile.whole += f64::from(self.whole);
+        tile.count += f64::from(self.blocks) * (BLOCK * BLOCK) as f64;
     }
 }
 
-/// Sum of p exp(-2 pi j (du u + dv v)) over a block about its middle.
+/// Sines and cosines of the multiples of both families' angles, cycles.
 #[inline]
-fn wave(p: &[[f32; 4]; 4], du: f32, dv: f32) -> (f32, f32) {
-    let (s1, c1) = sin_cos_cycles(0.5 * du);
-    let (s3, c3) = (s1 * (3.0 - 4.0 * s1 * s1), c1 * (4.0 * c1 * c1 - 3.0));
-    let row = |r: &[f32; 4]| ((r[1] + r[2]) * c1 + (r[0] + r[3]) * c3, (r[1] - r[2]) * s1 + (r[0] - r[3]) * s3);
-    let r: [(f32, f32); 4] = std::array::from_fn(|i| row(&p[i]));
-    let (s1, c1) = sin_cos_cycles(0.5 * dv);
-    let (s3, c3) = (s1 * (3.0 - 4.0 * s1 * s1), c1 * (4.0 * c1 * c1 - 3.0));
-    // Row -1.5 carries exp(+3j a), row 1.5 exp(-3j a).
-    let re = (r[1].0 + r[2].0) * c1 + (r[0].0 + r[3].0) * c3 - (r[1].1 - r[2].1) * s1 - (r[0].1 - r[3].1) * s3;
-    let im = (r[1].1 + r[2].1) * c1 + (r[0].1 + r[3].1) * c3 + (r[1].0 - r[2].0) * s1 + (r[0].0 - r[3].0) * s3;
-    (re, im)
+fn multiples(x: [f32; 2]) -> (Lanes, Lanes) {
+    let (mut sines, mut cosines) = ([0.0; LANES], [0.0; LANES]);
+    for (f, x) in x.into_iter().enumerate() {
+        let (s1, c1) = sin_cos_cycles(x);
+        let (mut s, mut c) = (s1, c1);
+        for l in f * HARMONICS..(f + 1) * HARMONICS {
+            (sines[l], cosines[l]) = (s, c);
+            (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
+        }
+    }
+    (sines, cosines)
 }
 
 /// Quantile of the tiles that counts as the strongest, and as the faintest.
@@ -161,12 +196,12 @@ const LEAST: f64 = 3.5e-5;
 
 /// Turns sums into measurements.
 ///
-/// `sign`: 1 for bright twine, -1 for dark. `gain`: that of the sums. `scratch` is overwritten.
+/// `gain`: that of the sums. `scratch` is overwritten.
 pub(crate) fn measure(
     surface: &Surface,
     view: &View,
     (level, tiling): (usize, usize),
-    sign: f64,
+    probe: Probe,
     gain: f32,
     sums: &[TileSum],
     scratch: &mut Vec<f64>,
@@ -189,7 +224,7 @@ pub(crate) fn measure(
             phase2: [0.0; 2],
             snr: [0.0; 2],
             k: [f64::INFINITY; 2],
-            amplitude: sum.z.map(|z| z[0].hypot(z[1]) / sum.count.max(1.0)),
+            amplitude: sum.z.map(|z| z[0][0].hypot(z[0][1]) / sum.count.max(1.0)),
             power: sum.whole / sum.count.max(1.0),
             good: false,
             empty: false,
@@ -198,10 +233,20 @@ pub(crate) fn measure(
         if let (true, Some(p), Some(pu), Some(pv)) = (site.valid, at(&site.ray), at(&site.next[0]), at(&site.next[1])) {
             m.predicted = p;
             for f in 0..2 {
-                m.phase[f] = (sign * sum.z[f][1]).atan2(sign * sum.z[f][0]);
-                m.phase2[f] = (sign * sum.z2[f][1]).atan2(sign * sum.z2[f][0]);
-                m.snr[f] = (sum.z[f][0].powi(2) + sum.z[f][1].powi(2)) / (0.5 * sum.power + 1e-9);
                 m.k[f] = (pu.s[f] - p.s[f]).hypot(pv.s[f] - p.s[f]);
+                match probe {
+                    Probe::Waves(sign) => {
+                        let [first, second, ..] = sum.z[f].map(|z| z.map(|z| sign * z));
+                        m.phase[f] = first[1].atan2(first[0]);
+                        m.phase2[f] = second[1].atan2(second[0]);
+                        m.snr[f] = (first[0].powi(2) + first[1].powi(2)) / (0.5 * sum.power + 1e-9);
+                    }
+                    Probe::Comb(comb) => {
+                        let (off, snr) = comb.peak(f, sum, m.k[f] * level.scale);
+                        m.phase[f] = off * std::f64::consts::TAU;
+                        m.snr[f] = snr;
+                    }
+                }
             }
             let resolved = m.k[0].max(m.k[1]) < 1.0 / (3.0 * view.reduction as f64);
             m.empty = sum.power < limit * sum.count;

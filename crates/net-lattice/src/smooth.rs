@@ -2,6 +2,8 @@
 
 use net_image::Image;
 
+use crate::numeric::magnitude_quantiles;
+
 /// Blurs with its buffers kept.
 #[derive(Debug, Default)]
 pub(crate) struct Smoother {
@@ -9,9 +11,29 @@ pub(crate) struct Smoother {
     half: Image<f32>,
     kernel: Vec<f32>,
     line: Vec<f32>,
+    square: Image<f32>,
+    energy: Image<f32>,
 }
 
 impl Smoother {
+    /// Divides a high-passed picture by its local deviation over `sigma` px, of which the `FAINT` quantile of the picture is the least. Outlines
+    /// of fish are many times as strong as twine, and there is more noise in one part of a picture than in another; a place has as much say
+    /// as it is like a net, not as it is bright (divisive normalisation).
+    pub(crate) fn equalize(&mut self, image: &mut Image<f32>, sigma: f32, histogram: &mut Vec<u32>) {
+        const FAINT: f64 = 0.3;
+        let (mut square, mut energy) = (std::mem::take(&mut self.square), std::mem::take(&mut self.energy));
+        square.resize(image.width(), image.height());
+        for (s, h) in square.data_mut().iter_mut().zip(image.data()) {
+            *s = h * h;
+        }
+        self.blur(&square, sigma, &mut energy);
+        let [least] = magnitude_quantiles(energy.data().iter().copied(), [FAINT], histogram);
+        for (h, e) in image.data_mut().iter_mut().zip(energy.data()) {
+            *h /= (e + least + 1e-12).sqrt();
+        }
+        (self.square, self.energy) = (square, energy);
+    }
+
     /// `out = image - blur(image)`, Gaussian of `sigma` px, edges mirrored.
     pub(crate) fn subtract_blur(&mut self, image: &Image<f32>, sigma: f32, out: &mut Image<f32>) {
         out.resize(image.width(), image.height());

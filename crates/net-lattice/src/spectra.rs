@@ -28,6 +28,8 @@ const LEAST_NOISE: f32 = 0.01;
 /// Radius, bins, from which the highest of 3 x 3 bins stands for the middle one: steps of the search's grid are constant in the logarithm,
 /// so they are wider there than a peak is.
 const POOLED: f64 = 30.0;
+/// Over which contrast is made alike, in lengths of the high-pass filter.
+const NEAR: f64 = 0.5;
 /// Bins along a side of the blocks from which the noise floor is taken.
 const FLOOR: usize = 4;
 
@@ -169,6 +171,8 @@ impl Spectra {
     pub(crate) fn compute(&mut self, view: &View, bank: &mut Bank, smoother: &mut Smoother) {
         let level = &view.levels[bank.level];
         smoother.subtract_blur(&level.raw, (bank.smooth_px / level.scale) as f32, &mut self.high);
+        let near = NEAR * bank.smooth_px / level.scale;
+        smoother.equalize(&mut self.high, near as f32, &mut self.histogram);
         let clip = clip_level(self.high.data().iter().copied(), &mut self.histogram).max(1e-9);
         let gain = 1.0 / clip;
         for p in self.high.data_mut() {

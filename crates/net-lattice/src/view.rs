@@ -79,9 +79,10 @@ impl Level {
         smoother.subtract_blur(&self.raw, (sigma / self.scale) as f32, &mut self.high);
     }
 
-    /// Fills `thin` in the same way.
-    pub(crate) fn filter_thin(&mut self, sigma: f64, smoother: &mut Smoother) {
+    /// Fills `thin` in the same way, with contrast made alike over the picture.
+    pub(crate) fn filter_thin(&mut self, sigma: f64, smoother: &mut Smoother, histogram: &mut Vec<u32>) {
         smoother.subtract_blur(&self.raw, (sigma / self.scale) as f32, &mut self.thin);
+        smoother.equalize(&mut self.thin, (sigma / self.scale) as f32, histogram);
     }
 
     pub(crate) fn blocks(&self) -> (usize, usize) {

@@ -3,17 +3,18 @@
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
+use crate::comb::{Comb, Signs};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
 use crate::fold::{Fold, Folder};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
-use crate::lockin::{Measurement, TileSum, Window, demodulate, measure};
+use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
 use crate::model::Model;
 use crate::numeric::clip_level;
-use crate::search::{Candidate, Scope, Search};
+use crate::search::{Background, Candidate, Scope, Search};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
 use crate::stages::Stages;
@@ -33,6 +34,8 @@ const NEAR: f64 = 220.0;
 pub(crate) const LOUDEST: f64 = 60.0;
 /// Power of a wave over that of noise from which it is clear.
 const LOUD: f64 = 12.0;
+/// How clear and in step waves of a rival period are at least, of what clear waves in perfect step are.
+const THERE: f64 = 0.08;
 /// Smallest cell, full-resolution px on the axis, that is looked for.
 pub(crate) const SMALLEST_CELL: f64 = 3.7;
 
@@ -41,6 +44,7 @@ pub(crate) struct Workspace {
     pub view: View,
     pub banks: Vec<(Bank, Search)>,
     pub spectra: Spectra,
+    pub background: Background,
     pub tools: Tools,
     pub scope: Scope,
     pub prior: Prior,
@@ -71,6 +75,9 @@ pub(crate) struct Tools {
     pub scores: Vec<(usize, Params)>,
     pub folder: Folder,
     pub unwrapper: Unwrapper,
+    /// Tiles, of this tiling, that a comparison of drawings looks at; empty for all.
+    pub mask: Vec<bool>,
+    pub tiling: usize,
     /// Length of the filter of each level's `high`; zero for none yet.
     pub high: [f64; 4],
     /// The same of `thin`, and the gain of the lock-in.
@@ -85,14 +92,23 @@ impl Tools {
     }
 }
 
+/// Where a lock-in starts, full-resolution px, and for what kind of twine.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seed {
+    pub centre: [f64; 2],
+    pub polarity: Polarity,
+}
+
 /// A locked candidate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lock {
+    /// The candidate's score in the search, and how far it stood above its background.
+    pub score: f64,
+    pub above: f64,
     pub surface: Surface,
     /// What the search gave to lock to.
     pub start: Surface,
-    /// Where it started, full-resolution px.
-    pub centre: [f64; 2],
+    pub seed: Seed,
     pub evidence: Evidence,
     pub gain: f64,
     pub polarity: Polarity,
@@ -127,6 +143,7 @@ impl Workspace {
             prior: Prior { sigma: surface::prior(config), angle: mesh.angle() },
             banks,
             spectra: Spectra::new(),
+            background: Background::default(),
             tools: Tools::default(),
             candidates: Vec::new(),
             found: Vec::new(),
@@ -168,7 +185,7 @@ impl Workspace {
         let sigma = self.view.thin_px(cell);
         let t = &mut self.tools;
         if t.thin[level].0 != sigma {
-            self.view.levels[level].filter_thin(sigma, &mut t.smoother);
+            self.view.levels[level].filter_thin(sigma, &mut t.smoother, &mut t.histogram);
             let q = clip_level(self.view.levels[level].thin.data().iter().copied(), &mut t.histogram);
             t.thin[level] = (sigma, 1.0 / (q + 1e-9));
         }
@@ -180,20 +197,47 @@ impl Workspace {
         (self.view.level_for(self.short_px(depth), 12.0), self.view.tiling_for(self.cell_px(depth)))
     }
 
-    /// One lock-in at the predicted sheet.
-    pub(crate) fn measure<const SECOND: bool>(
-        &mut self,
-        surface: &Surface,
-        place: (usize, usize),
-        sign: f64,
-        window: &Window,
-    ) {
+    /// The sums of a lock-in at the predicted sheet; returns the gain they were taken with.
+    fn demodulate(&mut self, surface: &Surface, place: (usize, usize), window: &Window) -> f32 {
         let gain = self.thin(place.0, self.cell_px(surface.depth));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
-        demodulate::<SECOND>(level, place.1, &t.map, gain, window, &mut t.sums);
-        measure(surface, &self.view, place, sign, gain, &t.sums, &mut t.scratch, &mut t.measurements);
+        demodulate(level, place.1, &t.map, gain, window, &mut t.sums);
+        gain
+    }
+
+    /// The last sums read as combs of this polarity.
+    fn comb(&mut self, surface: &Surface, place: (usize, usize), signs: Signs, gain: f32) {
+        let width = self.scope.sides.map(|s| self.twine / s);
+        let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
+        let t = &mut self.tools;
+        let comb = Comb::new(&t.sums, width, cell, signs, &mut t.scratch);
+        measure(surface, &self.view, place, Probe::Comb(comb), gain, &t.sums, &mut t.scratch, &mut t.measurements);
+    }
+
+    /// What a fitted sheet that lies on the twine has for it: first by all harmonics together, then by the first two, whose measurements are left
+    /// behind.
+    pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), polarity: Polarity) -> Evidence {
+        let gain = self.demodulate(surface, place, &Window::ALL);
+        self.comb(surface, place, Signs::on_twine(polarity), gain);
+        let all = self.evidence();
+        let t = &mut self.tools;
+        let probe = Probe::Waves(f64::from(polarity.sign()));
+        measure(surface, &self.view, place, probe, gain, &t.sums, &mut t.scratch, &mut t.measurements);
+        self.evidence().with_comb(&all)
+    }
+
+    /// One lock-in by all harmonics together.
+    pub(crate) fn measure_comb(
+        &mut self,
+        surface: &Surface,
+        place: (usize, usize),
+        polarity: Polarity,
+        window: &Window,
+    ) {
+        let gain = self.demodulate(surface, place, window);
+        self.comb(surface, place, Signs::on_waves(polarity), gain);
     }
 
     /// What the last measurements say for the lattice.
@@ -218,41 +262,59 @@ impl Workspace {
 
     /// Where in the picture the waves of a predicted sheet are seen best: there a lock-in starts. The sheet is moved to fit there. A fish on
     /// the optical axis hides no net beside it.
-    pub(crate) fn seed(&mut self, surface: &mut Surface) -> [f64; 2] {
+    pub(crate) fn seed(&mut self, surface: &mut Surface) -> Seed {
         surface.offset = [0.0; 2];
-        self.measure::<false>(surface, (self.scale_for(surface.depth).0, 0), 1.0, &Window::ALL);
-        let measurements = &self.tools.measurements;
-        let mut best = (f64::NEG_INFINITY, self.view.centre, [0.0; 2]);
-        for place in measurements.iter().filter(|m| m.good) {
-            let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
-            let mut sum = [[0.0; 2]; 2];
-            for m in measurements.iter().filter(|m| m.good) {
-                let w = window.weight(m.site.pixel);
-                for f in 0..2 {
-                    // A tile has as much say as its wave is clear; how strong it is says more of fish.
-                    let say = w * m.snr[f].min(LOUD).sqrt();
-                    sum[f][0] += say * m.phase[f].cos();
-                    sum[f][1] += say * m.phase[f].sin();
+        let place = (self.scale_for(surface.depth).0, 0);
+        let gain = self.demodulate(surface, place, &Window::ALL);
+        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, polarity: Polarity::Bright }, [0.0; 2]);
+        for polarity in Polarity::BOTH {
+            self.comb(surface, place, Signs::on_waves(polarity), gain);
+            let measurements = &self.tools.measurements;
+            for place in measurements.iter().filter(|m| m.good) {
+                let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
+                let sum = together(measurements, |_, m| window.weight(m.site.pixel));
+                let clear = sum.map(|z| z[0].hypot(z[1]));
+                // Range and normal are those on the axis: the nearer the better.
+                let score = clear[0].min(clear[1]) * self.window(CENTRAL).weight(place.site.pixel);
+                if score > best.0 {
+                    let seed = Seed { centre: place.site.pixel, polarity };
+                    best = (score, seed, sum.map(cycles));
                 }
-            }
-            let clear = sum.map(|z| z[0].hypot(z[1]));
-            // Range and normal are those on the axis: the nearer the better.
-            let score = clear[0].min(clear[1]) * self.window(CENTRAL).weight(place.site.pixel);
-            if score > best.0 {
-                best = (score, place.site.pixel, sum.map(|z| z[1].atan2(z[0]) / std::f64::consts::TAU));
             }
         }
         surface.offset = best.2;
         best.1
     }
 
+    /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns what kind of twine
+    /// that is; `None` if waves of that period are not there at all.
+    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Polarity> {
+        surface.offset = [0.0; 2];
+        let place = (level, self.tools.tiling);
+        let gain = self.demodulate(surface, place, &Window::ALL);
+        let mut best = (THERE, Polarity::Bright, [0.0; 2]);
+        for polarity in Polarity::BOTH {
+            self.comb(surface, place, Signs::on_waves(polarity), gain);
+            let t = &self.tools;
+            let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
+            let sum = together(&t.measurements, say);
+            let all: f64 = t.measurements.iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
+            let clear = sum.map(|z| z[0].hypot(z[1]) / all.max(1e-9));
+            if clear[0].min(clear[1]) > best.0 {
+                best = (clear[0].min(clear[1]), polarity, sum.map(cycles));
+            }
+        }
+        surface.offset = best.2;
+        (best.0 > THERE).then_some(best.1)
+    }
+
     /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
-    pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], centre: [f64; 2]) -> Option<Surface> {
+    pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], seed: Seed) -> Option<Surface> {
         let mut surface = *start;
         let place = self.scale_for(surface.depth);
         for &(radius, model) in schedule {
-            let window = Window { centre, radius: radius * self.view.size };
-            self.measure::<false>(&surface, place, 1.0, &window);
+            let window = Window { centre: seed.centre, radius: radius * self.view.size };
+            self.measure_comb(&surface, place, seed.polarity, &window);
             let t = &mut self.tools;
             t.observations.clear();
             for m in &t.measurements {
@@ -311,7 +373,13 @@ impl Workspace {
                 drawing.sparse = true;
                 drawing.offset = if polarity == Polarity::Dark { 0.5 } else { 0.0 };
                 let t = &mut self.tools;
-                let gain = t.likelihood.gain(&t.map, &drawing, &mut t.smoother) * area;
+                let gain = t.likelihood.gain(
+                    &t.map,
+                    &drawing,
+                    &self.view.levels[level].tiles[t.tiling],
+                    &t.mask,
+                    &mut t.smoother,
+                ) * area;
                 if gain > best.0 {
                     best = (gain, polarity, blur);
                 }
@@ -351,4 +419,23 @@ impl Workspace {
         }
         fit
     }
+}
+
+/// Sum of the unit vectors of both families' phases over the good tiles, each with as much say as its wave is clear; how strong it is says more of fish.
+fn together(measurements: &[Measurement], weight: impl Fn(usize, &Measurement) -> f64) -> [[f64; 2]; 2] {
+    let mut sum = [[0.0; 2]; 2];
+    for (k, m) in measurements.iter().enumerate().filter(|(_, m)| m.good) {
+        let w = weight(k, m);
+        for f in 0..2 {
+            let say = w * m.snr[f].min(LOUD).sqrt();
+            sum[f][0] += say * m.phase[f].cos();
+            sum[f][1] += say * m.phase[f].sin();
+        }
+    }
+    sum
+}
+
+/// Direction of such a sum, cycles.
+fn cycles(z: [f64; 2]) -> f64 {
+    z[1].atan2(z[0]) / std::f64::consts::TAU
 }

@@ -1,0 +1,99 @@
+//! Where the twines of a tile are, from several harmonics together.
+//!
+//! Thin twine is a comb: its harmonics are nearly as strong as its fundamental, while fish, shadows and clouds are mostly long waves. The harmonics
+//! `z_h` of one family in one tile, demodulated at h times the predicted phase, peak together where the lattice is off by `e` cells:
+//! `C(e) = sum_h w_h Re(z_h exp(-2 pi j h e))`, the matched filter for a comb in coloured noise.
+
+use crate::likelihood::Polarity;
+use crate::lockin::TileSum;
+use crate::numeric::{median, sin_cos_cycles};
+
+/// Harmonics that are summed.
+pub(crate) const HARMONICS: usize = 4;
+/// Steps of a cell in which the peak is looked for.
+const STEPS: usize = 24;
+/// Highest frequency, cycles per px of the level, at which a harmonic is measured.
+const HIGHEST: f64 = 0.42;
+/// Blur of an ordinary picture, px of the level, one standard deviation.
+const BLUR_PX: f64 = 0.9;
+
+/// Signs of odd and of even harmonics.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Signs([f64; 2]);
+
+impl Signs {
+    /// Of a sheet whose lines lie on the twine.
+    pub(crate) fn on_twine(polarity: Polarity) -> Self {
+        Self([f64::from(polarity.sign()); 2])
+    }
+
+    /// Of a sheet as the lock-in has it: where the fundamental is highest, half a cell beside dark twine.
+    pub(crate) fn on_waves(polarity: Polarity) -> Self {
+        Self([1.0, f64::from(polarity.sign())])
+    }
+}
+
+/// Weights of the harmonics for one picture, sheet and polarity.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Comb {
+    weight: [[f64; HARMONICS]; 2],
+}
+
+impl Comb {
+    /// For twine of `width` cells along both families, in cells of `cell` px of the level. The power of each harmonic in the middle one of the tiles stands
+    /// for that of the noise: where the net is strong it makes all harmonics count alike.
+    ///
+    pub(crate) fn new(sums: &[TileSum], width: [f64; 2], cell: f64, signs: Signs, scratch: &mut Vec<f64>) -> Self {
+        let weight = std::array::from_fn(|f| {
+            std::array::from_fn(|k| {
+                let h = (k + 1) as f64;
+                if h > HIGHEST * cell {
+                    return 0.0;
+                }
+                scratch.clear();
+                let power = |s: &TileSum| (s.z[f][k][0].powi(2) + s.z[f][k][1].powi(2)) / (0.5 * s.power + 1e-9);
+                scratch.extend(sums.iter().filter(|s| s.power > 0.0).map(power));
+                let noise = median(scratch).max(0.5);
+                let bar = std::f64::consts::PI * h * width[f];
+                let blur = std::f64::consts::TAU * h * BLUR_PX / cell;
+                let shape = bar.sin() / bar.max(1e-9) * (-0.5 * blur * blur).exp();
+                shape.max(0.0) / noise * signs.0[k % 2]
+            })
+        });
+        Self { weight }
+    }
+
+    /// Cells by which family `f` of a tile is off, in [-0.5, 0.5), and the power of that peak against the mean of noise; `k` is the length of the wave
+    /// vector, cells per px of the level.
+    pub(crate) fn peak(&self, f: usize, sum: &TileSum, k: f64) -> (f64, f64) {
+        let resolved = ((HIGHEST / k) as usize).clamp(1, HARMONICS);
+        let (weight, z) = (&self.weight[f][..resolved], &sum.z[f]);
+        let height = |e: f32| {
+            let (s1, c1) = sin_cos_cycles(e);
+            let (mut s, mut c) = (s1, c1);
+            let mut sum = 0.0;
+            for (w, z) in weight.iter().zip(z) {
+                sum += w * (z[0] * f64::from(c) + z[1] * f64::from(s));
+                (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
+            }
+            sum
+        };
+        let step = 1.0 / STEPS as f32;
+        let mut best = (f64::NEG_INFINITY, 0);
+        for k in 0..STEPS {
+            let h = height(k as f32 * step - 0.5);
+            if h > best.0 {
+                best = (h, k);
+            }
+        }
+        let middle = best.1 as f32 * step - 0.5;
+        let (a, b, c) = (height(middle - step), best.0, height(middle + step));
+        let bend = a - 2.0 * b + c;
+        let part = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+        let mut off = f64::from(middle) + part * f64::from(step);
+        off -= (off + 0.5).floor();
+        let whole: f64 = weight.iter().map(|w| w * w).sum();
+        let top = (b - 0.25 * (a - c) * part).max(0.0);
+        (off, top * top / (0.5 * sum.power * whole + 1e-9))
+    }
+}
