@@ -120,10 +120,13 @@ impl Envelopes {
             let ratio = power.sqrt() / wave.noise;
             for axis in 0..2 {
                 let (mut drift, mut total) = (Complex64::default(), 0.0);
+                // By the pair's first point.
+                let mut weights_of = [0.0; POINTS];
                 for_neighbours(axis, |a, b| {
                     let product = left[b] * left[a].conj();
                     drift += product;
-                    total += product.norm();
+                    weights_of[a] = product.norm_sqr().sqrt();
+                    total += weights_of[a];
                 });
                 if !(total > 0.0 && ratio.is_finite()) {
                     continue;
@@ -134,7 +137,7 @@ impl Envelopes {
                 let mean_change = |field: &LatticeField| {
                     let phases = section.view.grid_rays.map(|ray| field.phases(ray)[wave.family]);
                     let mut sum = 0.0;
-                    for_neighbours(axis, |a, b| sum += (left[b] * left[a].conj()).norm() * (phases[b] - phases[a]));
+                    for_neighbours(axis, |a, b| sum += weights_of[a] * (phases[b] - phases[a]));
                     Some(sum / total / STEP)
                 };
                 let coherence = drift.norm() / total;
@@ -243,14 +246,17 @@ pub(crate) fn cut_out(section: &Section, at: Vector2<f64>, radius: f64) -> [Comp
     // Turns per bin at the points, and the turn from one bin to the next.
     let turns = |side: f64| GRID.map(|part| TAU * ((part + 0.5) * side - 0.5) / side);
     let (turns_u, turns_v) = (turns(width), turns(height));
-    let steps_v = turns_v.map(Complex64::cis);
-    let first_v = (at.y - radius).ceil();
+    let (steps_u, steps_v) = (turns_u.map(Complex64::cis), turns_v.map(Complex64::cis));
+    let first = [at.x, at.y].map(|centre| (centre - radius).ceil());
+    let mut waves_u = turns_u.map(|turn| Complex64::cis(turn * first[0]));
+    let first_waves_v = turns_v.map(|turn| Complex64::cis(turn * first[1]));
     let mut amplitudes = [Complex64::default(); POINTS];
     for kx in range(at.x) {
         let mut column = [Complex64::default(); GRID.len()];
-        let mut waves_v = turns_v.map(|turn| Complex64::cis(turn * first_v));
+        let mut waves_v = first_waves_v;
         for ky in range(at.y) {
-            let distance = (kx as f64 - at.x).hypot(ky as f64 - at.y) / radius;
+            let away = Vector2::new(kx as f64, ky as f64) - at;
+            let distance = away.norm() / radius;
             if distance < 1.0 {
                 // Falls to zero at the rim: a patch that ends sharply rings.
                 let weight = (0.5 * PI * distance).cos();
@@ -260,10 +266,10 @@ pub(crate) fn cut_out(section: &Section, at: Vector2<f64>, radius: f64) -> [Comp
             }
             waves_v.iter_mut().zip(&steps_v).for_each(|(wave, step)| *wave *= step);
         }
-        let waves_u = turns_u.map(|turn| Complex64::cis(turn * kx as f64));
         for (row, &sum) in amplitudes.chunks_exact_mut(GRID.len()).zip(&column) {
             row.iter_mut().zip(&waves_u).for_each(|(amplitude, wave)| *amplitude += sum * wave);
         }
+        waves_u.iter_mut().zip(&steps_u).for_each(|(wave, step)| *wave *= step);
     }
     amplitudes
 }

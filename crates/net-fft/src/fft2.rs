@@ -3,24 +3,27 @@
 use std::sync::Arc;
 
 use net_image::View;
-use realfft::{RealFftPlanner, RealToComplex};
+use rustfft::algorithm::BluesteinsAlgorithm;
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use crate::error::{Error, Result};
 
 /// Plans and scratch for images of one size. See the crate's manual for normalization and output order.
+///
+/// Rows are transformed two at a time, as the real and the imaginary part of one: the halves of the picture, one on top of the other. After the transposition they are told apart
+/// column by column, by the symmetry of a real row's transform, and each column is transformed while it is at hand.
 pub struct RealFft2 {
     width: usize,
     height: usize,
-    row_plan: Arc<dyn RealToComplex<f32>>,
+    row_plan: Arc<dyn Fft<f32>>,
     column_plan: Arc<dyn Fft<f32>>,
-    /// One row of the image, in and out of the caller's hands.
-    row: Vec<f32>,
-    /// Rows transformed, row by row: the transpose's input.
-    rows: Vec<Complex32>,
-    row_scratch: Vec<Complex32>,
-    column_scratch: Vec<Complex32>,
+    /// Two rows of the image, in and out of the caller's hands.
+    rows: [Vec<f32>; 2],
+    /// Pairs of rows transformed, pair by pair, and the same transposed.
+    pairs: Vec<Complex32>,
+    turned: Vec<Complex32>,
+    scratch: Vec<Complex32>,
 }
 
 impl std::fmt::Debug for RealFft2 {
@@ -38,15 +41,16 @@ impl RealFft2 {
         if width == 0 || height == 0 {
             return Err(Error::EmptySize { width, height });
         }
-        let row_plan = RealFftPlanner::new().plan_fft_forward(width);
-        let column_plan = FftPlanner::new().plan_fft_forward(height);
+        let (row_plan, column_plan) = (plan(width), plan(height));
+        let scratch = row_plan.get_inplace_scratch_len().max(column_plan.get_inplace_scratch_len());
+        let pairs = vec![Complex32::default(); width * height.div_ceil(2)];
         Ok(Self {
             width,
             height,
-            row: vec![0.0; width],
-            rows: vec![Complex32::default(); (width / 2 + 1) * height],
-            row_scratch: row_plan.make_scratch_vec(),
-            column_scratch: vec![Complex32::default(); column_plan.get_inplace_scratch_len()],
+            rows: [vec![0.0; width], vec![0.0; width]],
+            turned: pairs.clone(),
+            pairs,
+            scratch: vec![Complex32::default(); scratch],
             row_plan,
             column_plan,
         })
@@ -78,20 +82,62 @@ impl RealFft2 {
         Ok(())
     }
 
-    /// Transforms the image whose row `v` is what `fill(v, row)` writes into `row`: lets a window be applied on the way.
+    /// Transforms the image whose row `v` is what `fill(v, row)` writes into `row`: lets a window be applied on the way. Rows are not asked for in their order.
     pub fn forward_rows(&mut self, mut fill: impl FnMut(usize, &mut [f32]), out: &mut HalfSpectrum) {
-        let bins = self.width / 2 + 1;
         out.resize(self.width, self.height);
-        for (v, to) in self.rows.chunks_exact_mut(bins).enumerate() {
-            fill(v, &mut self.row);
-            // All three buffers were made by this very plan's lengths in `new`.
-            self.row_plan
-                .process_with_scratch(&mut self.row, to, &mut self.row_scratch)
-                .expect("buffers of the plan's own lengths");
+        let half = self.height.div_ceil(2);
+        let [upper, lower] = &mut self.rows;
+        for (v, pair) in self.pairs.chunks_exact_mut(self.width).enumerate() {
+            fill(v, upper);
+            if v + half < self.height {
+                fill(v + half, lower);
+            } else {
+                lower.fill(0.0);
+            }
+            for ((to, &re), &im) in pair.iter_mut().zip(&*upper).zip(&*lower) {
+                *to = Complex32::new(re, im);
+            }
+            self.row_plan.process_with_scratch(pair, &mut self.scratch);
         }
-        transpose::transpose(&self.rows, &mut out.data, bins, self.height);
-        self.column_plan.process_with_scratch(&mut out.data, &mut self.column_scratch);
+        transpose::transpose(&self.pairs, &mut self.turned, self.width, half);
+        for (kx, column) in out.data.chunks_exact_mut(self.height).enumerate() {
+            let mirrored = &self.turned[(self.width - kx) % self.width * half..][..half];
+            let both = self.turned[kx * half..][..half].iter().zip(mirrored);
+            let (upper, lower) = column.split_at_mut(half);
+            // Z = A + iB, and a real row's transform is its own mirror image, conjugated.
+            for (to, (z, m)) in upper.iter_mut().zip(both.clone()) {
+                *to = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
+            }
+            for (to, (z, m)) in lower.iter_mut().zip(both) {
+                *to = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
+            }
+            self.column_plan.process_with_scratch(column, &mut self.scratch);
+        }
     }
+}
+
+/// Largest prime factor for which the library has fast kernels.
+const LARGEST_FAST_PRIME: usize = 11;
+
+/// The plan for `length` points. One prime factor without a fast kernel (848 has 53) makes the library's own plan three times as slow as a convolution (Bluestein 1970) of
+/// twice the length, which can have any factors.
+fn plan(length: usize) -> Arc<dyn Fft<f32>> {
+    let mut planner = FftPlanner::new();
+    if without_factors_up_to(LARGEST_FAST_PRIME, length) == 1 {
+        return planner.plan_fft_forward(length);
+    }
+    let inner = (2 * length - 1..).find(|&n| without_factors_up_to(3, n) == 1).unwrap_or(length);
+    Arc::new(BluesteinsAlgorithm::new(length, planner.plan_fft_forward(inner)))
+}
+
+/// What is left of `number`, above 0, divided by all its factors up to `largest`.
+fn without_factors_up_to(largest: usize, mut number: usize) -> usize {
+    for factor in 2..=largest {
+        while number.is_multiple_of(factor) {
+            number /= factor;
+        }
+    }
+    number
 }
 
 /// Half of the transform of a real image; the other half is its complex conjugate. Reused between transforms.

@@ -90,15 +90,18 @@ struct Scale {
 
 impl Scale {
     fn of(spectrum: &HalfSpectrum, logarithm: bool) -> Self {
-        let (mut low, mut high) = (f32::INFINITY, 0.0f32);
+        // In lanes, which the compiler makes vectors of: one comparison does not wait for the one before.
+        let (mut lows, mut highs) = ([f32::INFINITY; 8], [0.0f32; 8]);
         for kx in 0..=spectrum.width() / 2 {
-            let column = spectrum.column(kx);
-            for bin in &column[usize::from(kx == 0)..] {
-                let power = bin.norm_sqr();
-                low = if power < low { power } else { low };
-                high = if power > high { power } else { high };
+            for bins in spectrum.column(kx)[usize::from(kx == 0)..].chunks(lows.len()) {
+                for ((low, high), bin) in lows.iter_mut().zip(&mut highs).zip(bins) {
+                    let power = bin.norm_sqr();
+                    *low = if power < *low { power } else { *low };
+                    *high = if power > *high { power } else { *high };
+                }
             }
         }
+        let (low, high) = (lows.into_iter().fold(f32::INFINITY, f32::min), highs.into_iter().fold(0.0, f32::max));
         let unit = |power: f32| if logarithm { log_magnitude(power) } else { power.sqrt() };
         let (weakest, strongest) = (unit(low.min(high)), unit(high));
         let range = strongest - weakest;
@@ -111,7 +114,11 @@ impl Scale {
     }
 
     fn levels(&self, bins: &[Complex32], levels: &mut [u8]) {
-        let level = |x: f32| ((x - self.weakest) * self.levels_per_unit + 0.5) as u8;
+        // Rounded: the digits after the point do not fit beside 2^23. (A cast minds values out of range one by one.)
+        let level = |x: f32| {
+            let level = ((x - self.weakest) * self.levels_per_unit).clamp(0.0, 255.0);
+            (level + 8_388_608.0).to_bits() as u8
+        };
         if self.logarithm {
             bins.iter().zip(levels).for_each(|(bin, to)| *to = level(log_magnitude(bin.norm_sqr())));
         } else {
