@@ -1,10 +1,12 @@
 //! Junctions from the outlines of the net's meshes (thesis, 4.4).
 
+mod block_mean;
 mod cluster;
 mod config;
 mod covering;
 mod detector;
 mod expectation;
+mod level;
 mod naming;
 mod quadrilateral;
 mod rectangle;

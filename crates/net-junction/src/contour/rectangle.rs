@@ -66,15 +66,26 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
         return None;
     }
     let mut best: Option<Rectangle> = None;
+    // Past the last corner comes the first; a remainder would cost more than the rest.
+    let corner = |k: usize| {
+        hull[if k < n {
+            k
+        } else if k < 2 * n {
+            k - n
+        } else {
+            k % n
+        }]
+    };
+    let mut least = f64::INFINITY;
     // Calipers: the corners farthest along the side, across it, and back along it. Each only ever moves on.
     let (mut ahead, mut across, mut back) = (1, 1, 1);
     for i in 0..n {
-        let Some(t) = (hull[(i + 1) % n] - hull[i]).try_normalize(0.0) else { continue };
+        let Some(t) = (corner(i + 1) - hull[i]).try_normalize(0.0) else { continue };
         let normal = Vector2::new(-t.y, t.x);
         let climb = |mut k: usize, direction: Vector2<f64>| {
             // At most one round: guards against a polygon that is not convex.
             for _ in 0..n {
-                if direction.dot(&(hull[(k + 1) % n] - hull[k % n])) <= 0.0 {
+                if direction.dot(&(corner(k + 1) - corner(k))) <= 0.0 {
                     break;
                 }
                 k += 1;
@@ -84,15 +95,16 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
         ahead = climb(ahead.max(i + 1), t);
         across = climb(across.max(ahead), normal);
         back = climb(back.max(across), -t);
-        let (low, high) = (t.dot(&hull[back % n]), t.dot(&hull[ahead % n]));
-        let (near, far) = (normal.dot(&hull[i]), normal.dot(&hull[across % n]));
-        let rectangle = Rectangle {
-            centre: t * (0.5 * (low + high)) + normal * (0.5 * (near + far)),
-            half1: t * (0.5 * (high - low)),
-            half2: normal * (0.5 * (far - near)),
-        };
-        if best.is_none_or(|b| rectangle.area() < b.area()) {
-            best = Some(rectangle);
+        let (low, high) = (t.dot(&corner(back)), t.dot(&corner(ahead)));
+        let (near, far) = (normal.dot(&hull[i]), normal.dot(&corner(across)));
+        let area = (high - low) * (far - near);
+        if area < least {
+            least = area;
+            best = Some(Rectangle {
+                centre: t * (0.5 * (low + high)) + normal * (0.5 * (near + far)),
+                half1: t * (0.5 * (high - low)),
+                half2: normal * (0.5 * (far - near)),
+            });
         }
     }
     best.filter(|b| b.area() > 0.0 && b.area().is_finite())

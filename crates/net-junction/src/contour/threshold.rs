@@ -3,80 +3,21 @@
 use net_geometry::nalgebra::Vector2;
 use net_image::{GrayView, Image};
 
+use crate::contour::block_mean::{BlockMean, TILE, rounded};
 use crate::contour::config::{Config, LocalMean};
+use crate::contour::level::Level;
 
-/// Side of the squares over which block size and threshold offset are constant or interpolated, px.
-const TILE: usize = 16;
 /// Fixed-point scale of grey levels inside this stage: the 3 x 3 binomial kernel is then exact.
 const SCALE: f64 = 16.0;
 /// Largest block, px: its sum still fits 32 bits, 4080 * 1001² < 2³².
 const BLOCK_MAX: f64 = 1001.0;
-/// Level of the frame that closes the picture: twine for sure.
-const FRAME: i16 = i16::MAX;
-
-/// Signed distance of each pixel from the threshold, in sixteenths of a grey level: twine where not negative. One pixel of frame, which
-/// counts as twine, lies all round, so that followers of borders need no look at the picture's end.
-#[derive(Debug, Default)]
-pub(crate) struct Level {
-    values: Vec<i16>,
-    width: usize,
-    height: usize,
-}
-
-impl Level {
-    fn resize(&mut self, width: usize, height: usize) {
-        self.width = width;
-        self.height = height;
-        self.values.clear();
-        self.values.resize((width + 2) * (height + 2), FRAME);
-    }
-
-    /// Values from one row to the next.
-    pub fn stride(&self) -> usize {
-        self.width + 2
-    }
-    /// All values with the frame.
-    pub fn values(&self) -> &[i16] {
-        &self.values
-    }
-    /// Width of the picture without the frame, px.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-    /// Height of the picture without the frame, px.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-    /// Row `v` of the picture without the frame.
-    pub fn row(&self, v: usize) -> &[i16] {
-        &self.values[(v + 1) * self.stride() + 1..][..self.width]
-    }
-    fn row_mut(&mut self, v: usize) -> &mut [i16] {
-        let start = (v + 1) * self.stride() + 1;
-        &mut self.values[start..][..self.width]
-    }
-
-    /// For tests of the stages after this one.
-    #[cfg(test)]
-    pub fn from_fn(width: usize, height: usize, f: impl Fn(usize, usize) -> i16) -> Self {
-        let mut level = Self::default();
-        level.resize(width, height);
-        for v in 0..height {
-            for (u, value) in level.row_mut(v).iter_mut().enumerate() {
-                *value = f(u, v);
-            }
-        }
-        level
-    }
-}
 
 /// Buffers of the threshold stage.
 #[derive(Debug, Default)]
 pub(crate) struct Threshold {
     blurred: Image<u16>,
     scratch: Image<u16>,
-    /// Sums over all pixels above and left, one row and column of zeros first; they wrap, and differences are right all the same.
-    sums: Vec<u32>,
+    block_mean: BlockMean,
     /// Local mean.
     mean: Image<u16>,
     /// Pixel less local mean.
@@ -100,12 +41,13 @@ impl Threshold {
         self.plan_blocks(width, height, config, &cell_side);
         let side = self.small_side(config);
         self.blur(image, (config.blur_cells * side).max(config.blur_min_px));
-        self.mean.resize(width, height);
         let boxes = if config.mean == LocalMean::Box { 1 } else { 3 };
         for pass in 0..boxes {
-            let source = if pass == 0 { &self.blurred } else { &self.mean };
-            sum_up(source, &mut self.sums);
-            self.box_mean();
+            if pass > 0 {
+                std::mem::swap(&mut self.mean, &mut self.scratch);
+            }
+            let source = if pass == 0 { &self.blurred } else { &self.scratch };
+            self.block_mean.take(source, &self.half_blocks, &mut self.mean);
         }
         self.deviation.resize(width, height);
         let pixels = self.blurred.data().iter().zip(self.mean.data());
@@ -132,11 +74,16 @@ impl Threshold {
             while u < width {
                 let (col0, col1, a) = between_tiles(u, wide);
                 let end = (((u + TILE / 2) / TILE) * TILE + TILE / 2).min(width);
-                let (mut offset, step) = (at(col0) + a * (at(col1) - at(col0)), (at(col1) - at(col0)) / TILE as f32);
-                for (t, &d) in target[u..end].iter_mut().zip(&source[u..end]) {
-                    let o = offset as i16;
-                    *t = if light { d - o } else { -d - o };
-                    offset += step;
+                let (offset, step) = (at(col0) + a * (at(col1) - at(col0)), (at(col1) - at(col0)) / TILE as f32);
+                let sign = if light { 1 } else { -1 };
+                if step == 0.0 {
+                    let offset = rounded(offset) as i16;
+                    target[u..end].iter_mut().zip(&source[u..end]).for_each(|(t, &d)| *t = sign * d - offset);
+                    u = end;
+                    continue;
+                }
+                for (k, (t, &d)) in target[u..end].iter_mut().zip(&source[u..end]).enumerate() {
+                    *t = sign * d - rounded(offset + step * k as f32) as i16;
                 }
                 u = end;
             }
@@ -217,42 +164,6 @@ impl Threshold {
         }
     }
 
-    /// Mean over each pixel's block, as far as it lies inside the picture, from `sums` into `mean`.
-    fn box_mean(&mut self) {
-        let (width, height) = (self.mean.width(), self.mean.height());
-        let stride = width + 1;
-        for v in 0..height {
-            for tile in 0..self.tiles_wide {
-                let half = usize::from(self.half_blocks[(v / TILE) * self.tiles_wide + tile]);
-                let (top, bottom) = (v.saturating_sub(half) * stride, (v + half + 1).min(height) * stride);
-                let rows = (bottom - top) / stride;
-                let (start, end) = (tile * TILE, (tile * TILE + TILE).min(width));
-                let mean = &mut self.mean.row_mut(v)[start..end];
-                if start >= half && end + half <= width {
-                    let count = end - start;
-                    let slice = |row: usize, u: usize| &self.sums[row + u..][..count];
-                    let (right, left) = (start + half + 1, start - half);
-                    let corners = slice(bottom, right).iter().zip(slice(bottom, left));
-                    let corners = corners.zip(slice(top, right).iter().zip(slice(top, left)));
-                    let scale = 1.0 / (rows * (2 * half + 1)) as f32;
-                    for (m, ((&br, &bl), (&tr, &tl))) in mean.iter_mut().zip(corners) {
-                        let sum = br.wrapping_sub(bl).wrapping_sub(tr).wrapping_add(tl);
-                        *m = (sum as f32).mul_add(scale, 0.5) as u16;
-                    }
-                } else {
-                    for (k, m) in mean.iter_mut().enumerate() {
-                        let (left, right) = ((start + k).saturating_sub(half), (start + k + half + 1).min(width));
-                        let sum = self.sums[bottom + right]
-                            .wrapping_sub(self.sums[bottom + left])
-                            .wrapping_sub(self.sums[top + right])
-                            .wrapping_add(self.sums[top + left]);
-                        *m = (sum as f32 / (rows * (right - left)) as f32 + 0.5) as u16;
-                    }
-                }
-            }
-        }
-    }
-
     /// Threshold offset per tile: mean absolute deviation over the tiles that the block touches.
     fn measure_spread(&mut self, config: &Config) {
         let (width, height) = (self.deviation.width(), self.deviation.height());
@@ -296,28 +207,12 @@ fn between_tiles(pixel: usize, tiles: usize) -> (usize, usize, f32) {
     (first, second, (pixel - half - tile * TILE) as f32 / TILE as f32)
 }
 
-/// Sums over all pixels above and left of each, with a first row and column of zeros.
-fn sum_up(source: &Image<u16>, sums: &mut Vec<u32>) {
-    let (width, height) = (source.width(), source.height());
-    let stride = width + 1;
-    sums.clear();
-    sums.resize(stride * (height + 1), 0);
-    for v in 0..height {
-        let (above, here) = sums.split_at_mut((v + 1) * stride);
-        let above = &above[v * stride..];
-        let mut row = 0_u32;
-        for ((s, &a), &p) in here[1..stride].iter_mut().zip(&above[1..]).zip(source.row(v)) {
-            row = row.wrapping_add(u32::from(p));
-            *s = a.wrapping_add(row);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use net_image::View;
 
     use super::*;
+    use crate::contour::level::FRAME;
 
     /// A picture of coarse random waves; deterministic.
     fn picture(width: usize, height: usize) -> Vec<u8> {

@@ -6,7 +6,10 @@
 
 use net_geometry::nalgebra::Vector2;
 
-use crate::contour::threshold::Level;
+use crate::contour::level::{FRAME, Level};
+
+/// Pixels of a row that are looked at together.
+const STRIP: usize = 8;
 
 /// The closed outline of an opening.
 #[derive(Debug)]
@@ -37,20 +40,36 @@ impl Tracer {
         for v in 0..level.height() {
             let first = (v + 1) * stride + 1;
             let row = &level.values()[first - 1..][..level.width() + 1];
-            for (u, pair) in row.windows(2).enumerate() {
-                if pair[0] >= 0 && pair[1] < 0 && !self.passed[first + u] {
-                    self.follow(level, first + u, longest, &mut visit);
+            for u in (0..level.width()).step_by(STRIP) {
+                let end = (u + STRIP).min(level.width());
+                let pairs = || row[u..end].iter().zip(&row[u + 1..=end]);
+                // Most strips hold no left crack: a look at the signs of all of them at once.
+                if pairs().fold(0, |any, (&left, &here)| any | (!left & here)) >= 0 {
+                    continue;
+                }
+                for (k, (&left, &here)) in (u..end).zip(pairs()) {
+                    if left >= 0 && here < 0 && !self.passed[first + k] {
+                        self.follow(level, first + k, (k as i32, v as i32), longest, &mut visit);
+                    }
                 }
             }
         }
     }
 
-    /// Walks the border that begins at the left crack of pixel `start`.
-    fn follow(&mut self, level: &Level, start: usize, longest: usize, visit: &mut impl FnMut(Outline)) {
+    /// Walks the border that begins at the left crack of pixel `start`, `(u, v)` in the picture.
+    fn follow(
+        &mut self,
+        level: &Level,
+        start: usize,
+        (mut u, mut v): (i32, i32),
+        longest: usize,
+        visit: &mut impl FnMut(Outline),
+    ) {
         let (values, stride) = (level.values(), level.stride());
+        let (last_u, last_v) = (level.width() as i32 - 1, level.height() as i32 - 1);
         // East, south, west, north: turning right adds one.
+        let (along_u, along_v) = ([1, 0, -1, 0], [0, 1, 0, -1]);
         let steps = [1_isize, stride as isize, -1, -(stride as isize)];
-        let unit = [Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0), Vector2::new(-1.0, 0.0), Vector2::new(0.0, -1.0)];
         // The frame is one pixel wide, so a step from a pixel of the picture, or one more to the side, stays inside `values`.
         let at = |pixel: usize, direction: usize| pixel.wrapping_add_signed(steps[direction]);
         self.points.clear();
@@ -59,37 +78,38 @@ impl Tracer {
         loop {
             let left = (heading + 3) & 3;
             let outside = at(pixel, left);
-            let (u, v) = ((pixel % stride) as i64 - 1, (pixel / stride) as i64 - 1);
             if heading == 3 {
                 self.passed[pixel] = true;
             }
             // The crack's part of the shoelace sum: only cracks along u add v du.
             match heading {
-                0 => doubled_area -= 2 * v,
-                2 => doubled_area += 2 * (v + 1),
+                0 => doubled_area -= 2 * i64::from(v),
+                2 => doubled_area += 2 * i64::from(v + 1),
                 _ => {}
             }
-            if u == 0 && left == 2
-                || v == 0 && left == 3
-                || u + 1 == level.width() as i64 && left == 0
-                || v + 1 == level.height() as i64 && left == 1
-            {
-                cut = true;
-            }
+            cut |= match left {
+                0 => u == last_u,
+                1 => v == last_v,
+                2 => u == 0,
+                _ => v == 0,
+            };
             if self.points.len() <= longest {
                 let (inner, outer) = (f64::from(values[pixel]), f64::from(values[outside]));
                 // inner < 0 <= outer; the frame's level is no measurement.
-                let part = if values[outside] == i16::MAX { 0.5 } else { inner / (inner - outer) };
-                self.points.push(Vector2::new(u as f64, v as f64) + unit[left] * part);
+                let part = if values[outside] == FRAME { 0.5 } else { inner / (inner - outer) };
+                let (du, dv) = (f64::from(along_u[left]), f64::from(along_v[left]));
+                self.points.push(Vector2::new(f64::from(u) + du * part, f64::from(v) + dv * part));
             }
             let ahead = at(pixel, heading);
             if values[ahead] >= 0 {
                 heading = (heading + 1) & 3;
-            } else if values[at(ahead, left)] >= 0 {
-                pixel = ahead;
             } else {
-                pixel = at(ahead, left);
-                heading = left;
+                (pixel, u, v) = (ahead, u + along_u[heading], v + along_v[heading]);
+                let aside = at(ahead, left);
+                if values[aside] < 0 {
+                    (pixel, u, v) = (aside, u + along_u[left], v + along_v[left]);
+                    heading = left;
+                }
             }
             if pixel == start && heading == 3 {
                 break;
