@@ -1,6 +1,6 @@
-//! Draws pictures, times the stages on them and finds their poses: the half in Rust of `benches/peer/thesis.py`, which does the same on OpenCV.
+//! Draws pictures, times the thesis's stages on them and finds their poses: the half in Rust of `benches/peer/thesis.py`, which does the same on OpenCV.
 //!
-//! `cargo run --release -p net-fft --example peer -- FOLDER` writes `NAME.pgm` and prints lines of comma-separated fields:
+//! `cargo run --release --no-default-features --example thesis_peer -- FOLDER` writes `NAME.pgm` and prints lines of comma-separated fields:
 //! `truth,NAME,range_m,nx,ny,nz`, `pose,NAME,METHOD,range_m,nx,ny,nz,probability` (empty without a net) and `time,NAME,STAGE,microseconds` (mean over [`ENOUGH_SECONDS`] on a core).
 
 use std::error::Error;
@@ -13,6 +13,7 @@ use net_fft::{
 };
 use net_geometry::{Camera, Lens, Mesh};
 use net_image::{Image, View};
+use net_junction::{CellArea, Expectation, JunctionDetector, Polarity};
 use net_sim::{Layer, NetPose, Scene, Simulator};
 
 /// Runs go on for so long, on a core.
@@ -71,6 +72,34 @@ fn print_pose(name: &str, method: &str, found: Option<&ThesisEstimate>) {
     }
 }
 
+/// The thesis's whole frame: four sections, the plane, the cells' area all over it, junctions from contours.
+struct WholeFrame {
+    camera: Camera,
+    sections: ThesisEstimator,
+    contours: JunctionDetector,
+}
+
+impl WholeFrame {
+    fn new(camera: &Camera, mesh: &Mesh) -> Result<Self, Box<dyn Error>> {
+        // The drawn twine is light, and Algorithm 4 looks for light twine only, as the peer does.
+        let config = net_junction::Config { polarity: Polarity::Light, ..net_junction::Config::thesis() };
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        let contours = JunctionDetector::new(width, height, &config)?;
+        Ok(Self {
+            camera: *camera,
+            sections: ThesisEstimator::new(camera, mesh, &ThesisConfig::thesis(false))?,
+            contours,
+        })
+    }
+
+    /// Number of junctions; `None` without a plane.
+    fn run(&mut self, picture: View<'_, u8>) -> Result<Option<usize>, Box<dyn Error>> {
+        let Some(found) = self.sections.estimate(picture)? else { return Ok(None) };
+        let area = CellArea::on_plane(found.axis_cell_area, found.plane, self.camera);
+        Ok(Some(self.contours.detect(picture, Some(&Expectation::Area(area)))?.len()))
+    }
+}
+
 /// Times every stage of `picture`.
 fn time_stages(name: &str, picture: View<'_, u8>) -> Result<(), Box<dyn Error>> {
     let time = |stage: &str, microseconds: f64| println!("time,{name},{stage},{microseconds}");
@@ -106,6 +135,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut simulator = Simulator::new(camera);
     let mut thesis = ThesisEstimator::new(&camera, &mesh, &ThesisConfig::thesis(false))?;
     let mut together = ThesisEstimator::new(&camera, &mesh, &ThesisConfig::default())?;
+    let mut frame = WholeFrame::new(&camera, &mesh)?;
     let mut picture = Image::default();
     for (seed, (range_m, tilt_x_deg, tilt_y_deg)) in SCENES.into_iter().enumerate() {
         let name = format!("{range_m} m {tilt_x_deg} {tilt_y_deg}");
@@ -118,6 +148,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let view = picture.view().ok_or("no picture")?;
         time_stages(&name, view)?;
         println!("time,{name},four sections to the plane,{}", mean_time(|| thesis.estimate(view).is_ok()));
+        println!("time,{name},whole frame with junctions,{}", mean_time(|| frame.run(view).is_ok()));
+        println!("junctions,{name},{}", frame.run(view)?.unwrap_or_default());
         println!("time,{name},default: all sections together,{}", mean_time(|| together.estimate(view).is_ok()));
         print_pose(&name, "thesis", thesis.estimate(view)?.as_ref());
         print_pose(&name, "default", together.estimate(view)?.as_ref());

@@ -2,7 +2,7 @@
 
     python benches/peer/thesis.py          needs cargo; numpy, scipy, scikit-learn and opencv-python-headless
 
-Draws scenes with the simulator (`cargo run --release -p net-fft --example peer`), runs `thesis_opencv.py` on them, and prints for every
+Draws scenes with the simulator (`cargo run --release --no-default-features --example thesis_peer`), runs `thesis_opencv.py` on them, and prints for every
 stage the median over pictures of the mean time on a core, with the ratio, and how right the poses are: within 5 % and 5 degrees.
 """
 
@@ -60,6 +60,7 @@ def times(gray: np.ndarray) -> dict[str, float]:
         "peaks of a section": mean_time(lambda: peer.peaks(image)),
         "section to scored wave vectors": mean_time(lambda: peer.wave_vectors(peer.spectrum(section))),
         "four sections to the plane": mean_time(lambda: peer.sections(gray, K, CELL_M)),
+        "whole frame with junctions": mean_time(lambda: peer.frame(gray, K, CELL_M)),
     }
 
 
@@ -68,7 +69,7 @@ def main() -> None:
     ours, theirs = collections.defaultdict(list), collections.defaultdict(list)
     errors = collections.defaultdict(list)
     with tempfile.TemporaryDirectory() as folder:
-        command = ["cargo", "run", "--quiet", "--release", "-p", "net-fft", "--example", "peer", "--", folder]
+        command = ["cargo", "run", "--quiet", "--release", "--no-default-features", "--example", "thesis_peer", "--", folder]
         lines = list(csv.reader(subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.splitlines()))
         truth = {name: np.array(rest, float) for kind, name, *rest in lines if kind == "truth"}
 
