@@ -28,7 +28,7 @@ impl BlockMean {
             4 if alike => self.small_blocks::<9>(source, out),
             _ => {
                 self.sum_up(source);
-                self.from_sums(half_blocks, out);
+                self.means_by_sums(half_blocks, out);
             }
         }
     }
@@ -86,7 +86,7 @@ impl BlockMean {
     }
 
     /// Blocks of any size, from four of the sums each.
-    fn from_sums(&self, half_blocks: &[u16], out: &mut Image<u16>) {
+    fn means_by_sums(&self, half_blocks: &[u16], out: &mut Image<u16>) {
         let (width, height) = (out.width(), out.height());
         let (stride, tiles_wide) = (width + 1, width.div_ceil(TILE));
         for v in 0..height {
@@ -145,7 +145,7 @@ mod tests {
                 let (mut by_rows, mut by_sums) = (Image::default(), Image::new(width, height));
                 mean.take(&source, &half_blocks, &mut by_rows);
                 sums.sum_up(&source);
-                sums.from_sums(&half_blocks, &mut by_sums);
+                sums.means_by_sums(&half_blocks, &mut by_sums);
                 assert_eq!(by_rows.data(), by_sums.data(), "{width}x{height}, {half}");
             }
         }

@@ -79,8 +79,8 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
     let mut least = f64::INFINITY;
     // Calipers: the corners farthest along the side, across it, and back along it. Each only ever moves on.
     let (mut ahead, mut across, mut back) = (1, 1, 1);
-    for i in 0..n {
-        let Some(t) = (corner(i + 1) - hull[i]).try_normalize(0.0) else { continue };
+    for (i, &here) in hull.iter().enumerate() {
+        let Some(t) = (corner(i + 1) - here).try_normalize(0.0) else { continue };
         let normal = Vector2::new(-t.y, t.x);
         let climb = |mut k: usize, direction: Vector2<f64>| {
             // At most one round: guards against a polygon that is not convex.
@@ -96,7 +96,7 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
         across = climb(across.max(ahead), normal);
         back = climb(back.max(across), -t);
         let (low, high) = (t.dot(&corner(back)), t.dot(&corner(ahead)));
-        let (near, far) = (normal.dot(&hull[i]), normal.dot(&corner(across)));
+        let (near, far) = (normal.dot(&here), normal.dot(&corner(across)));
         let area = (high - low) * (far - near);
         if area < least {
             least = area;
