@@ -3,8 +3,9 @@
 //! ```text
 //! cargo run --release --example counting -- [SEQUENCES [FRAMES [FIRST_SEED]]]
 //! ```
-//! A small camera (424 x 240 px), steps of up to a cell a frame in every direction, speeds that change, turns and tilts; nets flat and bent, jittered, overgrown; murky water, noise, fish.
-//! A slip is a count that is off by more than half a cell against the frame before of the same `track`. A frame is flagged if its count was begun anew.
+//! A small camera (424 x 240 px), steps of up to a cell a frame in every direction, speeds that change, turns and tilts; nets flat and bent, jittered, overgrown or bare of growth,
+//! with another net behind and blurred by the motion; murky water, noise, fish.
+//! A slip is a count that is off by more than half a cell against the frame before of the same `track`. A frame is flagged if its count was begun anew, or is in doubt.
 
 use std::error::Error;
 
@@ -23,7 +24,7 @@ impl Random {
 }
 
 /// Kinds of sequences.
-const KINDS: [&str; 5] = ["strafe", "loop", "approach", "bent", "fish"];
+const KINDS: [&str; 8] = ["strafe", "loop", "approach", "bent", "fish", "murky", "bare", "behind"];
 const CELL_M: f64 = 0.05;
 const RATE_HZ: f64 = 10.0;
 
@@ -56,12 +57,29 @@ fn sequence(kind: usize, frames: u32, seed: u64) -> Scenario {
     scene.water.attenuation_per_m = Water::attenuation_of_visibility(random.between(4.0, 12.0));
     scene.sensor.read_noise_grey = random.between(1.0, 3.0);
     scene.sensor.exposure_s = 0.008;
-    if KINDS[kind] == "bent" {
+    if KINDS[kind] == "murky" {
+        scene.water.attenuation_per_m = Water::attenuation_of_visibility(random.between(2.0, 3.5));
+        scene.sensor.read_noise_grey = random.between(3.0, 5.0);
+    }
+    if KINDS[kind] == "bare" {
+        net.growth.density = 0.0;
+        net.jitter = random.between(0.01, 0.02);
+    }
+    if matches!(KINDS[kind], "bent" | "behind") {
         net.surface = Surface {
             curvature_per_m: [random.between(-0.5, 0.5), random.between(-0.2, 0.2), random.between(-0.4, 0.4)],
             cubic_per_m2: [random.between(-0.2, 0.2), 0.0, random.between(-0.2, 0.2), 0.0],
             ..Surface::default()
         };
+    }
+    if KINDS[kind] == "behind" {
+        // Blur of up to a quarter of a cell.
+        scene.sensor.exposure_s = 0.025;
+        let mut behind = scene.layers[0].clone();
+        behind.net.seed = seed + 1;
+        behind.pose.range_m += random.between(0.4, 0.8);
+        behind.pose.roll_deg += random.between(-10.0, 10.0);
+        scene.layers.push(behind);
     }
     if KINDS[kind] == "fish" {
         scene.objects = (0..4u8)
@@ -137,7 +155,7 @@ fn run(scenario: &Scenario, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
             tally.refused += 1;
             continue;
         }
-        tally.flagged += u32::from(connection == Connection::Restarted);
+        tally.flagged += u32::from(matches!(connection, Connection::Restarted | Connection::Doubted));
         tally.recognised += u32::from(connection == Connection::Recognised);
         let Some(found) = tracker.lattice_at_axis() else { continue };
         let off = (found - cells).map(f64::round);

@@ -28,6 +28,10 @@ pub enum Connection {
     Started,
     /// From frame to frame.
     Followed,
+    /// Named by the best guess from the frame before, perhaps off by whole cells; so is the next such frame against this one. The number is this frame's alone.
+    Doubted,
+    /// The doubt is over: frames together told what one did not. The count before the doubt goes on, and with it its number.
+    Settled,
     /// The net was lost, or in doubt, and what was seen of its cells before told which ones these are: an earlier count goes on, and with it its number.
     Recognised,
     /// The net was lost, or in doubt: a new count, with another origin.
@@ -40,6 +44,8 @@ impl Connection {
         match self {
             Self::Started => "started",
             Self::Followed => "followed",
+            Self::Doubted => "doubted",
+            Self::Settled => "settled",
             Self::Recognised => "recognised",
             Self::Restarted => "restarted",
         }
@@ -101,10 +107,13 @@ pub struct Estimate<'a> {
     /// The pose, when the status is [`Status::Ok`].
     pub net: Option<NetPose>,
     /// Number of the count of cells. Frames of the same number have the same node as the net frame's origin. Each time the net was lost and the count had to start
-    /// anew it is one that was not there before; when a place is recognised it is again that of the earlier count.
+    /// anew it is one that was not there before; when a place is recognised, or a doubt is settled, it is again that of the earlier count.
     pub track: u32,
     /// How that count goes on from the frames before; of frames with a pose.
     pub connection: Connection,
+    /// Cells that were added to the names of this frame's nodes, which had been carried on from the frame before. If the connection is [`Connection::Settled`], the frames
+    /// in doubt are explained too: of n frames, this one among them, the k-th was named with k n-ths of this too little. Zero where a place was recognised or a count begun.
+    pub corrected: (i32, i32),
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
     /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].

@@ -42,6 +42,13 @@ impl Motion {
         Some(Pose { rotation, translation: -(rotation * centre) })
     }
 
+    /// The camera was elsewhere in the net when the last pose was seen: by whole cells, `net_shift`, m.
+    pub fn renumber(&mut self, net_shift: Vector3<f64>) {
+        if let Some((_, pose)) = &mut self.last {
+            pose.translation -= pose.rotation * net_shift;
+        }
+    }
+
     /// A pose that is believed.
     pub fn observe(&mut self, timestamp_ns: i64, pose: &Pose) {
         self.velocity = self.last.and_then(|(then, last)| {

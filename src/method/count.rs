@@ -1,8 +1,8 @@
 //! Which cells: what does not repeat in the picture has the last word on the count.
 
+use net_flow::Pyramid;
 use net_flow::vote::{CellMap, CellVote, RecallConfig, Verdict, VoteConfig, VoteResult};
 use net_geometry::nalgebra::Vector2;
-use net_image::GrayView;
 
 use crate::error::Result;
 use crate::estimate::Connection;
@@ -12,7 +12,9 @@ use crate::estimate::Connection;
 pub(super) enum Naming {
     /// Where they were predicted, within a fraction of a cell.
     Sure,
-    /// The likeliest; may be off by whole cells.
+    /// Where they were predicted by a velocity that is itself a guess: if it is off by some cells a frame, then by the same ones in every frame.
+    Carried,
+    /// The likeliest of this frame by itself; may be off by whole cells.
     Guess,
     /// Nothing to go by.
     New,
@@ -27,6 +29,8 @@ const LOOK_UP_EVERY: u32 = 4;
 pub(super) struct Counted {
     /// To be added to the names that it came with.
     pub cells: (i32, i32),
+    /// To be added to those of the frame before, for a velocity that is right.
+    pub cells_before: (i32, i32),
     pub connection: Connection,
     /// Whether the vote was certain.
     pub proven: bool,
@@ -42,6 +46,14 @@ struct Before {
     age: u32,
 }
 
+/// Frames in doubt: named by guess, each under a number of its own. The map stays that of the count before the doubt.
+#[derive(Debug, Clone, Copy)]
+struct Doubt {
+    /// The count before.
+    home: u32,
+    frames: u32,
+}
+
 /// Counts cells from frame to frame, and recognises places.
 #[derive(Debug)]
 pub(super) struct CellCount {
@@ -54,6 +66,7 @@ pub(super) struct CellCount {
     map: CellMap,
     map_before: CellMap,
     before: Option<Before>,
+    doubt: Option<Doubt>,
 }
 
 impl CellCount {
@@ -67,6 +80,7 @@ impl CellCount {
             map: map()?,
             map_before: map()?,
             before: None,
+            doubt: None,
         })
     }
 
@@ -75,75 +89,128 @@ impl CellCount {
         self.track
     }
 
-    /// The next frame with a pose: the cell at its optical axis, how its nodes were named, and where they are.
+    /// The next frame with a pose, flattened: the cell at its optical axis, how its nodes were named, and where they are.
     pub fn update(
         &mut self,
-        image: GrayView<'_>,
+        picture: &Pyramid,
         middle: (i32, i32),
         naming: Naming,
         pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Counted {
-        if naming == Naming::New {
-            self.vote.reset();
+        match naming {
+            Naming::New => self.vote.reset(),
+            // What is off by some cells once adds nothing to what was off by some in every frame.
+            Naming::Guess => self.vote.drop_doubt(),
+            Naming::Sure | Naming::Carried => {}
         }
-        let vote = self.vote.update(image, middle, pixel_from_lattice);
+        let vote = self.vote.update_flat(picture, middle, pixel_from_lattice);
         let proven = vote.verdict == Verdict::Decided;
         let counted = Counted { proven, ..self.judge(&vote, middle, naming) };
-        if proven || counted.connection != Connection::Followed {
+        let in_doubt = counted.connection == Connection::Doubted;
+        if (proven || counted.connection != Connection::Followed) && !in_doubt {
             // Frames in doubt have no place in the map.
             self.vote.remember(&mut self.map);
         }
-        self.middle = (middle.0.saturating_add(counted.cells.0), middle.1.saturating_add(counted.cells.1));
+        self.middle = plus(middle, counted.cells);
         counted
     }
 
     fn judge(&mut self, vote: &VoteResult, middle: (i32, i32), naming: Naming) -> Counted {
-        let told = |cells, connection| Counted { cells, connection, proven: false };
+        let whole = naming == Naming::Carried && vote.dropped == 0;
+        let doubt = self.doubt.take();
+        let doubt = doubt.filter(|d| {
+            let goes_on = whole && vote.frames == d.frames + 1;
+            if !goes_on {
+                // The last frame in doubt is where the count goes on from.
+                self.put_aside(d.home, (0, 0));
+            }
+            goes_on
+        });
+        let step = vote.shifts[0].cells;
+        let frames_before = i32::try_from(vote.frames).unwrap_or(i32::MAX).saturating_sub(1);
+        let cells_before = (step.0.saturating_mul(frames_before), step.1.saturating_mul(frames_before));
+        if let (Some(doubt), Some(cells)) = (doubt, vote.correction()) {
+            // All frames in doubt are explained by one velocity that was wrong, or right: the count before goes on.
+            self.track = doubt.home;
+            return Counted { cells_before, ..told(cells, Connection::Settled) };
+        }
         match (naming, vote.correction()) {
             (Naming::New, _) => self.find_or_restart(minus(self.middle, middle)),
-            (Naming::Guess, None) => self.find_or_restart((0, 0)),
+            (Naming::Guess | Naming::Carried, None) => self.find_or_doubt(vote, doubt),
             // Sure enough without a vote; or the frames before this one were numbered right, or are not in doubt.
             (Naming::Sure, None) | (_, Some((0, 0))) => self.look_up(),
             (Naming::Guess, Some(cells)) if vote.frames == 1 && vote.dropped == 0 => told(cells, Connection::Followed),
             // Numbers were given that now prove wrong by whole cells: those go under the old count, these under a new one.
             (_, Some(cells)) => {
                 self.restart((0, 0));
-                told(cells, Connection::Restarted)
+                Counted { cells_before, ..told(cells, Connection::Restarted) }
             }
         }
     }
 
+    /// Names are a guess, and the vote is in doubt: the map recognises the place, or more frames have to tell.
+    fn find_or_doubt(&mut self, vote: &VoteResult, doubt: Option<Doubt>) -> Counted {
+        if let Some(counted) = self.find((0, 0)) {
+            self.track = doubt.map_or(self.track, |d| d.home);
+            return counted;
+        }
+        let home = doubt.map_or(self.track, |d| d.home);
+        let frames = doubt.map_or(0, |d| d.frames) + 1;
+        if vote.verdict == Verdict::Ambiguous && vote.dropped == 0 && vote.frames == frames {
+            self.doubt = Some(Doubt { home, frames });
+            self.begin();
+            return told((0, 0), Connection::Doubted);
+        }
+        self.put_aside(home, (0, 0));
+        self.begin();
+        told((0, 0), Connection::Restarted)
+    }
+
     /// The net was lost: the map recognises the place, or the count begins anew. `around`: what is to be added to the names by the best guess.
     fn find_or_restart(&mut self, around: (i32, i32)) -> Counted {
-        if let Some(place) = self.vote.recall(&mut self.map, around).filter(|r| r.recognised) {
-            self.vote.renumber(place.cells);
-            return Counted { cells: place.cells, connection: Connection::Recognised, proven: false };
-        }
-        if let Some(before) = self.before
-            && let Some(counted) = self.go_back(before)
-        {
-            self.before = None;
+        if let Some(counted) = self.find(around) {
             return counted;
         }
         let first = self.next == 0;
         self.restart(around);
-        let connection = if first { Connection::Started } else { Connection::Restarted };
-        Counted { cells: (0, 0), connection, proven: false }
+        told((0, 0), if first { Connection::Started } else { Connection::Restarted })
+    }
+
+    /// The place in the map, or in that of the count before.
+    fn find(&mut self, around: (i32, i32)) -> Option<Counted> {
+        if let Some(place) = self.vote.recall(&mut self.map, around).filter(|r| r.recognised) {
+            self.vote.renumber(place.cells);
+            return Some(told(place.cells, Connection::Recognised));
+        }
+        let before = self.before?;
+        let counted = self.go_back(before)?;
+        self.before = None;
+        Some(counted)
     }
 
     fn restart(&mut self, around: (i32, i32)) {
-        if self.next > 0 && self.map.cells() > 0 {
-            std::mem::swap(&mut self.map, &mut self.map_before);
-            self.before = Some(Before { track: self.track, around, age: 0 });
-        }
-        self.map.clear();
+        self.put_aside(self.track, around);
+        self.begin();
+    }
+
+    /// A new number.
+    fn begin(&mut self) {
         self.track = self.next;
         self.next = self.next.saturating_add(1);
     }
 
+    /// The map is that of an earlier count from now on.
+    fn put_aside(&mut self, track: u32, around: (i32, i32)) {
+        if self.next > 0 && self.map.cells() > 0 {
+            std::mem::swap(&mut self.map, &mut self.map_before);
+            self.before = Some(Before { track, around, age: 0 });
+        }
+        self.map.clear();
+    }
+
     /// A young count may be the one before.
     fn look_up(&mut self) -> Counted {
-        let mut counted = Counted { cells: (0, 0), connection: Connection::Followed, proven: false };
+        let mut counted = told((0, 0), Connection::Followed);
         let Some(mut before) = self.before.take() else { return counted };
         before.age += 1;
         if before.age.is_multiple_of(LOOK_UP_EVERY)
@@ -162,8 +229,16 @@ impl CellCount {
         self.vote.renumber(place.cells);
         std::mem::swap(&mut self.map, &mut self.map_before);
         self.track = before.track;
-        Some(Counted { cells: place.cells, connection: Connection::Recognised, proven: false })
+        Some(told(place.cells, Connection::Recognised))
     }
+}
+
+fn told(cells: (i32, i32), connection: Connection) -> Counted {
+    Counted { cells, cells_before: (0, 0), connection, proven: false }
+}
+
+fn plus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
+    (a.0.saturating_add(b.0), a.1.saturating_add(b.1))
 }
 
 fn minus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {

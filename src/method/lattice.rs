@@ -1,6 +1,6 @@
 //! The precise way: one lattice on one sheet over the whole picture, followed from frame to frame.
 
-use net_flow::{FlowTracker, Hints, Motion as FlowMotion, Status};
+use net_flow::{FlowTracker, Hints, Mode, Motion as FlowMotion, Status};
 use net_geometry::nalgebra::Vector2;
 use net_geometry::{Camera, Junction, Mesh, Pose};
 use net_image::GrayView;
@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::estimate::{Connection, Layer, NetPose, Sheet};
 use crate::knots::Knots;
 use crate::method::Found;
-use crate::method::count::{CellCount, Naming};
+use crate::method::count::{CellCount, Counted, Naming};
 use crate::motion::Motion;
 use crate::prior::MotionPrior;
 
@@ -108,7 +108,7 @@ impl LatticeMethod {
             threshold: config.probability_threshold,
             motion: Motion::default(),
             count: CellCount::new()?,
-            flow: FlowTracker::new(width, height, &net_flow::Config::default())?,
+            flow: FlowTracker::new(width, height, &net_flow::Config { mode: Mode::Summed, ..Default::default() })?,
             last: None,
             flow_from: None,
             velocity_in_doubt: false,
@@ -126,16 +126,21 @@ impl LatticeMethod {
         prior: Option<&MotionPrior>,
         junctions: &mut Vec<Junction>,
     ) -> Result<Option<Found>> {
-        let step = self.flow.update(image, &Hints::default())?.step;
-        let flow = step.motion.map(|motion| (motion, step.status == Status::Tracked));
         self.motion.carry(prior);
-        let expected = self.expect(timestamp_ns, flow);
+        let mut expected = self.expect(timestamp_ns);
         // A prior, or a steady motion, says where the lattice is to a fraction of a cell, which is what following takes.
         let mut found = None;
         if let Some((pose, naming)) = &expected.first {
             let followed = self.estimator.update(image, pose)?;
             let followed = followed.filter(|e| e.probability >= self.threshold && is_near(e, pose));
             found = followed.map(|estimate| (estimate, *naming));
+        }
+        // How the picture flowed matters only where nothing surer tells, or against a prior that stands alone.
+        let steady = expected.steady.is_some_and(|(_, naming)| naming == Naming::Sure);
+        if found.is_none() || (expected.by_prior && !steady) {
+            self.flow(image, &mut expected)?;
+        } else {
+            self.flow.pass(image)?;
         }
         if found.is_none() {
             found = self.estimator.estimate(image)?.map(|estimate| name(estimate, &expected));
@@ -153,10 +158,15 @@ impl LatticeMethod {
             return Ok(None);
         };
         let vouched = estimate.probability >= self.threshold;
-        let mut connection = Connection::Followed;
+        let (mut connection, mut corrected) = (Connection::Followed, (0, 0));
         if vouched {
             self.list_junctions(image, &estimate, junctions)?;
-            (estimate, connection) = self.count_cells(image, estimate, naming, junctions);
+            let counted = self.count_cells(&estimate, naming, junctions);
+            estimate = estimate.renumbered(counted.cells);
+            connection = counted.connection;
+            if matches!(connection, Connection::Followed | Connection::Settled) {
+                corrected = counted.cells;
+            }
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
         }
@@ -165,11 +175,11 @@ impl LatticeMethod {
         if vouched {
             self.last = Some((timestamp_ns, estimate));
         }
-        Ok(Some(Found { net, probability, track, connection }))
+        Ok(Some(Found { net, probability, track, connection, corrected }))
     }
 
-    /// Where the net may be, from the surest witness to the least.
-    fn expect(&self, timestamp_ns: i64, flow: Option<(FlowMotion, bool)>) -> Expected {
+    /// Where the net may be, from the surest witness to the least; the flow, which takes its time, is not asked yet.
+    fn expect(&self, timestamp_ns: i64) -> Expected {
         let naming = |sure: bool| if sure { Naming::Sure } else { Naming::Guess };
         let sides = [self.estimator.mesh().side1(), self.estimator.mesh().side2()];
         let prior = self.motion.by_prior().map(|(pose, sigma)| {
@@ -177,51 +187,70 @@ impl LatticeMethod {
             (pose, naming(cells < SURE_PRIOR_CELLS))
         });
         // Over frames without a pose a velocity is a guess.
-        let gapless = self.last.as_ref().is_some_and(|(then, _)| self.flow_from == Some(*then));
-        let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, naming(gapless && !self.velocity_in_doubt)));
+        let by_velocity = match (self.gapless(), self.velocity_in_doubt) {
+            (false, _) => Naming::Guess,
+            (true, true) => Naming::Carried,
+            (true, false) => Naming::Sure,
+        };
+        let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, by_velocity));
         let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
-        let flowed = recent
-            .zip(flow)
-            .filter(|_| gapless)
-            .and_then(|((_, last), (motion, tracked))| Some((self.pose_after(last, &motion)?, naming(tracked))));
         let rest = recent.map(|(_, last)| (last.pose, Naming::Guess));
         // A vague prior is worth less than a velocity.
         let vague = prior.filter(|(_, naming)| *naming == Naming::Guess);
         let first = prior.filter(|(_, naming)| *naming == Naming::Sure).or(steady).or(vague);
-        Expected { by_prior: prior.is_some(), first, steady, flowed, rest }
+        Expected { by_prior: prior.is_some(), first, steady, flowed: None, rest }
     }
 
-    /// What does not repeat has the last word on the names of nodes; where it is silent, a guess is a new count.
-    fn count_cells(
-        &mut self,
-        image: GrayView<'_>,
-        estimate: LatticeEstimate,
-        naming: Naming,
-        junctions: &mut [Junction],
-    ) -> (LatticeEstimate, Connection) {
+    /// Whether the frame before had a pose that was vouched for.
+    fn gapless(&self) -> bool {
+        self.last.as_ref().is_some_and(|(then, _)| self.flow_from == Some(*then))
+    }
+
+    /// Where the net may be as the picture flowed.
+    fn flow(&mut self, image: GrayView<'_>, expected: &mut Expected) -> Result<()> {
+        let step = self.flow.update(image, &Hints::default())?.step;
+        let naming = if step.status == Status::Tracked { Naming::Sure } else { Naming::Guess };
+        if let (Some(motion), Some((_, last)), true) =
+            (step.motion, &self.last, expected.rest.is_some() && self.gapless())
+        {
+            expected.flowed = self.pose_after(last, &motion).map(|pose| (pose, naming));
+        }
+        Ok(())
+    }
+
+    /// What does not repeat has the last word on the names of nodes; where it is silent, a guess is in doubt. Renames all but `estimate`.
+    fn count_cells(&mut self, estimate: &LatticeEstimate, naming: Naming, junctions: &mut [Junction]) -> Counted {
         let camera = self.estimator.camera();
         self.knots.fill(junctions, |ij| estimate.pixel_from_lattice(camera, ij).map(|(pixel, _)| pixel));
-        let middle = SheetMap { estimate: &estimate, camera }.seed().unwrap_or_default();
+        let middle = SheetMap { estimate, camera }.seed().unwrap_or_default();
         let knots = &self.knots;
-        let counted = self.count.update(image, middle, naming, |ij| knots.pixel(ij));
-        if counted.connection == Connection::Restarted && naming == Naming::Guess && counted.cells == (0, 0) {
+        let counted = self.count.update(self.flow.picture(), middle, naming, |ij| knots.pixel(ij));
+        match counted.connection {
+            Connection::Followed => {}
             // Names go on by the best guess. So does the velocity: it makes better guesses, but is none to rely on.
-            self.velocity_in_doubt = true;
-        } else if counted.connection != Connection::Followed {
+            Connection::Doubted => self.velocity_in_doubt = true,
+            Connection::Restarted if naming != Naming::New && counted.cells == (0, 0) => self.velocity_in_doubt = true,
+            // The vote tells the velocity as well.
+            Connection::Settled | Connection::Restarted if counted.proven => {
+                let net_shift =
+                    estimate.renumbered(counted.cells_before).pose.camera_in_net() - estimate.pose.camera_in_net();
+                self.motion.renumber(net_shift);
+            }
             // What was renamed has no velocity: the change of names would look like one.
-            self.motion = Motion::default();
-            self.velocity_in_doubt = false;
+            _ => {
+                self.motion = Motion::default();
+                self.velocity_in_doubt = false;
+            }
         }
         self.velocity_in_doubt &= !counted.proven;
-        if counted.cells == (0, 0) {
-            return (estimate, counted.connection);
+        if counted.cells != (0, 0) {
+            let cells = counted.cells;
+            let moved = |index: (i32, i32)| (index.0.saturating_add(cells.0), index.1.saturating_add(cells.1));
+            junctions.iter_mut().for_each(|j| j.index = j.index.map(moved));
+            self.twines.iter_mut().for_each(|t| t.index = moved(t.index));
+            self.knots.renumber(cells);
         }
-        let moved =
-            |index: (i32, i32)| (index.0.saturating_add(counted.cells.0), index.1.saturating_add(counted.cells.1));
-        junctions.iter_mut().for_each(|j| j.index = j.index.map(moved));
-        self.twines.iter_mut().for_each(|t| t.index = moved(t.index));
-        self.knots.renumber(counted.cells);
-        (estimate.renumbered(counted.cells), counted.connection)
+        counted
     }
 
     /// The net before or behind the one of the last frame that had a pose, in that frame's picture.

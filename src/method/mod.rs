@@ -17,6 +17,8 @@ pub(crate) struct Found {
     pub track: u32,
     /// How the count goes on from the frames before.
     pub connection: Connection,
+    /// [`crate::Estimate::corrected`].
+    pub corrected: (i32, i32),
 }
 
 /// Numbers the counts of cells: each has an origin of its own.

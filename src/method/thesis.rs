@@ -108,7 +108,13 @@ impl ThesisMethod {
             sigma_xy_m: estimate.covariance.sigma_xy(&estimate.pose),
             sheet: None,
         };
-        Found { net, probability: estimate.probability, track: self.track.number(), connection: self.connection }
+        Found {
+            net,
+            probability: estimate.probability,
+            track: self.track.number(),
+            connection: self.connection,
+            corrected: (0, 0),
+        }
     }
 }
 

@@ -122,7 +122,8 @@ impl FlowTracker {
                 return Err(Error::Value { field, value: 0.0, expected: "at least one pixel" });
             }
         }
-        let pyramid = Pyramid::new(config.matching.levels);
+        // The vote wants a fourth.
+        let pyramid = Pyramid::new(config.matching.levels.max(crate::vote::LEVELS));
         let tracks = Tracks::new(width, height, config.seed_spacing_px);
         let most = tracks.most();
         let mut consensus = Consensus::new(&config.consensus)?;
@@ -178,16 +179,41 @@ impl FlowTracker {
         moved
     }
 
+    /// The next frame, for a caller who need not know how it moved: nothing is followed into it, and the next update begins from it. Takes a
+    /// fraction of the time.
+    ///
+    /// # Errors
+    /// [`Error::ImageSize`] for a picture of another size. The tracker is then as it was.
+    pub fn pass(&mut self, view: GrayView<'_>) -> Result<()> {
+        self.check_size(view)?;
+        self.next.build(self.flatten.apply(view), SMALLEST_SIDE_PX);
+        let frame = self.frame;
+        self.frame += 1;
+        self.begin(frame);
+        std::mem::swap(&mut self.prev, &mut self.next);
+        Ok(())
+    }
+
+    /// The latest frame, less the light's slow changes, and halved again and again.
+    pub fn picture(&self) -> &Pyramid {
+        &self.prev
+    }
+
+    fn check_size(&self, view: GrayView<'_>) -> Result<()> {
+        let (width, height) = (view.width(), view.height());
+        let (expected_width, expected_height) = (self.width, self.height);
+        if (width, height) == (expected_width, expected_height) {
+            return Ok(());
+        }
+        Err(Error::ImageSize { width, height, expected_width, expected_height })
+    }
+
     /// The next frame.
     ///
     /// # Errors
     /// [`Error::ImageSize`] for a picture of another size, [`Error::Value`] for a prior that is not a finite, positive deviation. The tracker is then as it was.
     pub fn update(&mut self, view: GrayView<'_>, hints: &Hints<'_>) -> Result<FlowResult<'_>> {
-        let (width, height) = (view.width(), view.height());
-        if (width, height) != (self.width, self.height) {
-            let (expected_width, expected_height) = (self.width, self.height);
-            return Err(Error::ImageSize { width, height, expected_width, expected_height });
-        }
+        self.check_size(view)?;
         if let Some(prior) = &hints.prior {
             crate::error::in_range("sigma_px", prior.sigma_px, 1e-3, 1e6, "a deviation of 0.001 to 1e6 px")?;
         }
@@ -200,6 +226,10 @@ impl FlowTracker {
             let points = self.tracks.list.len();
             self.start(frame, hints.seeds);
             return Ok(self.report(Status::Started, frame, Outcome::none(Status::Started, points), None, frame, None));
+        }
+        if self.tracks.list.is_empty() {
+            // The frame before was passed by.
+            self.tracks.reseed(&self.prev, &[], self.margin(), Some);
         }
         let step = self.step(hints);
         let key_frame = self.key_frame;
@@ -244,12 +274,22 @@ impl FlowTracker {
 
     /// Begins anew with the frame in `next`.
     fn start(&mut self, frame: u64, seeds: &[Vector2<f64>]) {
+        self.begin(frame);
+        self.tracks.reseed(&self.next, seeds, self.margin(), Some);
+        std::mem::swap(&mut self.prev, &mut self.next);
+    }
+
+    /// Forgets all tracks; the frame in `next` is the key frame.
+    fn begin(&mut self, frame: u64) {
         self.tracks.list.clear();
         self.velocity = Motion::identity();
         self.running = true;
-        self.tracks.reseed(&self.next, seeds, self.config.matching.half_window_px as f64 / 2.0, Some);
         self.renew_key(frame);
-        std::mem::swap(&mut self.prev, &mut self.next);
+    }
+
+    /// Distance from the picture's edge within which no point is seeded, px.
+    fn margin(&self) -> f64 {
+        self.config.matching.half_window_px as f64 / 2.0
     }
 
     /// Makes the frame in `next` the key frame.

@@ -1,11 +1,7 @@
 //! The picture cell by cell, its lattice subtracted.
 
 use nalgebra::Vector2;
-use net_image::{GrayView, Pyramid};
-
-use crate::block_match::SMALLEST_SIDE_PX;
-use crate::error::Result;
-use crate::flatten::Flatten;
+use net_image::Pyramid;
 
 /// Samples along a cell's side.
 const SIDE: usize = 12;
@@ -17,8 +13,6 @@ const NEIGHBOURS: usize = 3;
 const AMPLITUDE: std::ops::Range<f32> = 0.4..2.5;
 /// Fewest cells that make a frame.
 pub(super) const MIN_CELLS: usize = 12;
-/// Radius over which the light's slow changes are taken away, px.
-const FLATTEN_PX: usize = 25;
 
 /// What does not repeat, cell by cell.
 #[derive(Debug, Clone)]
@@ -65,8 +59,6 @@ impl Cells {
 /// Lays pictures out. Owns its buffers.
 #[derive(Debug)]
 pub(super) struct Layout {
-    flatten: Flatten,
-    pyramid: Pyramid,
     columns: usize,
     rows: usize,
     /// Sums over rows of neighbours, then over squares.
@@ -80,11 +72,9 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn new(columns: usize, rows: usize) -> Result<Self> {
+    pub(super) fn new(columns: usize, rows: usize) -> Self {
         let n = columns * rows;
-        Ok(Self {
-            flatten: Flatten::new(FLATTEN_PX)?,
-            pyramid: Pyramid::new(4),
+        Self {
             columns,
             rows,
             across: vec![[0.0; CELL]; n],
@@ -92,20 +82,19 @@ impl Layout {
             raw: vec![[0.0; CELL]; n],
             deviations: vec![0.0; n],
             sorted: Vec::with_capacity(n),
-        })
+        }
     }
 
     /// Fills `cells` from a picture; false when too few cells show a lattice.
     pub(super) fn fill(
         &mut self,
-        view: GrayView<'_>,
+        picture: &Pyramid,
         corner: (i32, i32),
         pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
         cells: &mut Cells,
     ) -> bool {
         cells.corner = corner;
         cells.clear();
-        self.pyramid.build(self.flatten.apply(view), SMALLEST_SIDE_PX);
         let at = |i: f64, j: f64| {
             let p = pixel_from_lattice(Vector2::new(f64::from(corner.0) + i, f64::from(corner.1) + j))?;
             (p.x.is_finite() && p.y.is_finite()).then_some(p)
@@ -122,8 +111,8 @@ impl Layout {
         };
         let nearest = (0..columns * rows).filter_map(sides).min_by_key(|(from_middle, _)| *from_middle);
         let Some((_, cell_px)) = nearest else { return false };
-        let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, self.pyramid.len() as f64 - 1.0) as usize;
-        let Some(view) = self.pyramid.level(level) else { return false };
+        let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, picture.len() as f64 - 1.0) as usize;
+        let Some(view) = picture.level(level) else { return false };
         let scale = f64::from(1u32 << level);
         for (k, (raw, valid)) in self.raw.iter_mut().zip(&mut cells.valid).enumerate() {
             let (i, j) = ((k % self.columns) as f64, (k / self.columns) as f64);

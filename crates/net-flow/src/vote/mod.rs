@@ -14,14 +14,21 @@ mod recall;
 mod score;
 
 use nalgebra::Vector2;
-use net_image::GrayView;
+use net_image::{GrayView, Pyramid};
 use serde::{Deserialize, Serialize};
 
+use crate::block_match::SMALLEST_SIDE_PX;
 use crate::error::{Result, in_range};
+use crate::flatten::Flatten;
 use cells::{Cells, Layout};
 use evidence::Evidence;
 pub use recall::{CellMap, Recall, RecallConfig};
 use score::Scores;
+
+/// Levels of the pyramid of a picture: cells of some 100 px still have about a sample a pixel.
+pub(crate) const LEVELS: usize = 4;
+/// Radius over which the light's slow changes are taken away, px.
+const FLATTEN_PX: usize = 20;
 
 /// Parameters of the vote.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -122,6 +129,14 @@ impl VoteResult {
 /// Compares each frame with the one before. Owns its buffers.
 #[derive(Debug)]
 pub struct CellVote {
+    flatten: Flatten,
+    pyramid: Pyramid,
+    frames: Frames,
+}
+
+/// The frames that are compared.
+#[derive(Debug)]
+struct Frames {
     config: VoteConfig,
     layout: Layout,
     /// The last frame that was laid out, and the one before it.
@@ -141,23 +156,26 @@ impl CellVote {
     pub fn new(config: &VoteConfig) -> Result<Self> {
         config.validate()?;
         let (columns, rows) = (2 * config.half_columns, 2 * config.half_rows);
-        Ok(Self {
+        let frames = Frames {
             config: config.clone(),
-            layout: Layout::new(columns, rows)?,
+            layout: Layout::new(columns, rows),
             here: Cells::new(columns, rows),
             before: Cells::new(columns, rows),
             gap: 0,
             scores: Scores::new(config.reach_cells),
             evidence: Evidence::new(config),
-        })
+        };
+        Ok(Self { flatten: Flatten::new(FLATTEN_PX)?, pyramid: Pyramid::new(LEVELS), frames })
     }
 
     /// Forgets the frames so far.
     pub fn reset(&mut self) {
-        self.here.clear();
-        self.before.clear();
-        self.evidence.clear();
-        self.gap = 0;
+        self.frames.reset();
+    }
+
+    /// Forgets what undecided frames said: the next is judged by itself.
+    pub fn drop_doubt(&mut self) {
+        self.frames.evidence.clear();
     }
 
     /// The next frame. `middle` is the cell to lay out round (the one at the optical axis), `pixel_from_lattice` tells where a lattice coordinate (cycles along
@@ -169,11 +187,59 @@ impl CellVote {
         middle: (i32, i32),
         pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> VoteResult {
+        self.pyramid.build(self.flatten.apply(view), SMALLEST_SIDE_PX);
+        self.frames.update(&self.pyramid, middle, pixel_from_lattice)
+    }
+
+    /// [`CellVote::update`] of a picture that is prepared already: less the light's slow changes, and halved again and again, as [`crate::FlowTracker::picture`].
+    pub fn update_flat(
+        &mut self,
+        picture: &Pyramid,
+        middle: (i32, i32),
+        pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> VoteResult {
+        self.frames.update(picture, middle, pixel_from_lattice)
+    }
+
+    /// Adds the frame of the last update to a map, by the numbers that its result gave. Only frames whose numbers are certain belong there.
+    pub fn remember(&self, map: &mut CellMap) {
+        if self.frames.gap == 0 {
+            map.add(&self.frames.here);
+        }
+    }
+
+    /// Looks for the frame of the last update in a map. `around`: cells to be added to its numbers where the search begins. `None` if the frame or the map is empty, or they have
+    /// too little in common.
+    pub fn recall(&self, map: &mut CellMap, around: (i32, i32)) -> Option<Recall> {
+        if self.frames.gap == 0 { map.find(&self.frames.here, around) } else { None }
+    }
+
+    /// Moves the numbers of the last frame, for a caller that learned better.
+    pub fn renumber(&mut self, by: (i32, i32)) {
+        self.frames.here.renumber(by);
+        self.frames.evidence.clear();
+    }
+}
+
+impl Frames {
+    fn reset(&mut self) {
+        self.here.clear();
+        self.before.clear();
+        self.evidence.clear();
+        self.gap = 0;
+    }
+
+    fn update(
+        &mut self,
+        picture: &Pyramid,
+        middle: (i32, i32),
+        pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> VoteResult {
         let corner = (
             middle.0.saturating_sub(self.config.half_columns as i32),
             middle.1.saturating_sub(self.config.half_rows as i32),
         );
-        if !self.layout.fill(view, corner, pixel_from_lattice, &mut self.before) {
+        if !self.layout.fill(picture, corner, pixel_from_lattice, &mut self.before) {
             self.before.clear();
             self.gap += 1;
             if !self.evidence.is_empty() || self.gap > self.config.memory_frames {
@@ -199,24 +265,5 @@ impl CellVote {
             return VoteResult::without_scores(Verdict::Started);
         }
         result
-    }
-
-    /// Adds the frame of the last update to a map, by the numbers that its result gave. Only frames whose numbers are certain belong there.
-    pub fn remember(&self, map: &mut CellMap) {
-        if self.gap == 0 {
-            map.add(&self.here);
-        }
-    }
-
-    /// Looks for the frame of the last update in a map. `around`: cells to be added to its numbers where the search begins. `None` if the frame or the map is empty, or they have
-    /// too little in common.
-    pub fn recall(&self, map: &mut CellMap, around: (i32, i32)) -> Option<Recall> {
-        if self.gap == 0 { map.find(&self.here, around) } else { None }
-    }
-
-    /// Moves the numbers of the last frame, for a caller that learned better.
-    pub fn renumber(&mut self, by: (i32, i32)) {
-        self.here.renumber(by);
-        self.evidence.clear();
     }
 }

@@ -11,7 +11,9 @@ use anyhow::{Context, Result};
 use net_flow::vote::{CellMap, CellVote, RecallConfig, Verdict, VoteConfig};
 use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
-use netpose::Tracker;
+use netpose::{Connection, Tracker};
+
+use super::frames::Tracked;
 
 /// The columns of `count.csv`.
 pub const HEADER: [&str; 8] = ["frame", "track", "stretch", "offset_i", "offset_j", "verdict", "z", "sure"];
@@ -34,6 +36,20 @@ enum Said {
     Voted(Verdict),
     /// By the map of an earlier stretch.
     Recognised,
+}
+
+/// How the tracker named the nodes of a frame.
+#[derive(Debug, Clone, Copy)]
+struct Named {
+    track: u32,
+    connection: Connection,
+    corrected: (i32, i32),
+}
+
+impl From<&Tracked> for Named {
+    fn from(t: &Tracked) -> Self {
+        Self { track: t.track, connection: t.connection, corrected: t.corrected }
+    }
 }
 
 /// What is known of a frame's lattice coordinates.
@@ -72,7 +88,6 @@ struct Earlier {
 pub struct Count {
     vote: CellVote,
     memory: usize,
-    last_track: Option<u32>,
     /// The present stretch, and the first number that none has.
     stretch: u32,
     next: u32,
@@ -99,7 +114,6 @@ impl Count {
         Ok(Self {
             vote,
             memory,
-            last_track: None,
             stretch: 0,
             next: 1,
             age: 0,
@@ -116,41 +130,44 @@ impl Count {
     pub fn update(
         &mut self,
         frame: u64,
-        track: u32,
+        tracked: &Tracked,
         image: GrayView<'_>,
         tracker: &Tracker,
     ) -> Result<Option<Counted>> {
         let Some(axis) = tracker.lattice_at_axis().filter(|a| a.amax() < 1e8) else { return Ok(None) };
         let middle = (axis.x.round() as i32, axis.y.round() as i32);
-        self.step(frame, track, middle, image, |at| tracker.pixel_by_knots(at)).map(Some)
+        self.step(frame, &Named::from(tracked), middle, image, |at| tracker.pixel_by_knots(at)).map(Some)
     }
 
     fn step(
         &mut self,
         frame: u64,
-        track: u32,
+        named: &Named,
         middle: (i32, i32),
         image: GrayView<'_>,
         pixel: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Result<Counted> {
-        let changed = self.last_track.is_some_and(|last| last != track);
-        self.last_track = Some(track);
+        let changed = matches!(named.connection, Connection::Restarted | Connection::Recognised);
         if changed && !self.doubted.is_empty() {
             // What has been added up was about another count.
             self.break_off()?;
         }
-        let offset = self.offset;
-        let vote = |this: &mut Self| {
-            let middle = (middle.0.saturating_add(offset.0), middle.1.saturating_add(offset.1));
+        // As the names were before the tracker corrected them: what frames in doubt add up to is to be found here too.
+        let mut offset = minus(self.offset, named.corrected);
+        let vote = |this: &mut Self, offset: (i32, i32)| {
+            let middle = plus(middle, offset);
             let shift = Vector2::new(f64::from(offset.0), f64::from(offset.1));
             this.vote.update(image, middle, |at| pixel(at - shift))
         };
-        let mut result = vote(self);
-        if changed && result.verdict == Verdict::Ambiguous {
+        let mut result = vote(self, offset);
+        let ambiguous = result.verdict == Verdict::Ambiguous;
+        if ambiguous && (changed || named.corrected != (0, 0)) {
             // A count begun anew is off once, not more in every frame: one look has to decide.
             self.break_off()?;
-            result = vote(self);
+            offset = self.offset;
+            result = vote(self, offset);
         }
+        let track = named.track;
         let broken = result.verdict == Verdict::Decided && result.dropped > 0;
         let begins = result.verdict == Verdict::Started && self.age > 0;
         if broken || begins || result.verdict == Verdict::Blind {
@@ -165,8 +182,9 @@ impl Count {
                 doubted.sure = true;
             }
             self.give_up()?;
-            self.offset = plus(offset, correction);
+            offset = plus(offset, correction);
         }
+        self.offset = offset;
         let sure = matches!(result.verdict, Verdict::Decided | Verdict::Started);
         let (mut said, mut z) = (Said::Voted(result.verdict), result.shifts[0].z);
         let here = plus(middle, self.offset);
@@ -326,10 +344,13 @@ mod tests {
                 let at = at + off;
                 camera.pixel_from_point(pose.transform(mesh.node(at.x, at.y).push(0.0)))
             };
-            let (middle, track) =
-                ((axis.x.round() as i32, axis.y.round() as i32), u32::from(frame >= 2) + u32::from(frame >= 8));
+            let middle = (axis.x.round() as i32, axis.y.round() as i32);
+            let (track, corrected) = (u32::from(frame >= 2) + u32::from(frame >= 8), (0, 0));
+            let begun = matches!(frame, 2 | 8);
+            let connection = if begun { Connection::Restarted } else { Connection::Followed };
+            let named = Named { track, connection, corrected };
             let view = image.view().expect("pixels");
-            counted.push(count.step(u64::from(frame.unsigned_abs()), track, middle, view, pixel).expect("written"));
+            counted.push(count.step(u64::from(frame.unsigned_abs()), &named, middle, view, pixel).expect("written"));
         }
         count.finish().expect("written");
         let told: Vec<_> = counted.iter().map(|c| (c.stretch, c.offset, c.sure)).collect();

@@ -61,6 +61,8 @@ pub struct Tracked {
     pub track: u32,
     /// How that count goes on.
     pub connection: Connection,
+    /// Cells that were added to the names of nodes.
+    pub corrected: (i32, i32),
     pub net: Option<NetPose>,
     pub junctions: Vec<netpose::Junction>,
     pub twines: Vec<netpose::Twine>,
@@ -121,7 +123,7 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
             match (&tracked, image) {
                 (Ok(tracked), Ok(image)) => {
                     if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view())
-                        && let Some(counted) = count.update(frame.index, tracked.track, view, &tracker)?
+                        && let Some(counted) = count.update(frame.index, tracked, view, &tracker)?
                         && let Some(map) = &mut map
                     {
                         map.add(&counted, view, &tracker, &tracked.twines)?;
@@ -170,6 +172,7 @@ fn track(
             probability: estimate.probability,
             track: estimate.track,
             connection: estimate.connection,
+            corrected: estimate.corrected,
             net: estimate.net,
             latency: start.elapsed(),
             junctions: estimate.junctions.to_vec(),
