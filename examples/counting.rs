@@ -1,7 +1,7 @@
 //! Does the count of cells slip in silence? The tracker over many random simulated sequences, the count held against the truth in every frame.
 //!
 //! ```text
-//! cargo run --release --example counting -- [SEQUENCES [FRAMES [FIRST_SEED]]]
+//! cargo run --release --example counting -- [SEQUENCES [FRAMES [FIRST_SEED [KIND ...]]]]
 //! ```
 //! A small camera (424 x 240 px), steps of up to a cell a frame in every direction, speeds that change, turns and tilts; nets flat and bent, jittered, overgrown or bare of growth,
 //! with another net behind and blurred by the motion; murky water, noise, fish.
@@ -178,12 +178,16 @@ fn run(scenario: &Scenario, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let numbers: Vec<u64> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let numbers: Vec<u64> = std::env::args().skip(1).take(3).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let wanted: Vec<String> = std::env::args().skip(4).collect();
     let number = |k: usize, default: u64| numbers.get(k).copied().unwrap_or(default);
     let (sequences, frames, first) = (number(0, 20), u32::try_from(number(1, 50))?, number(2, 1));
     let mut tallies = [Tally::default(); KINDS.len()];
     for seed in first..first + sequences {
         for (kind, name) in KINDS.iter().enumerate() {
+            if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
+                continue;
+            }
             let mut scenario = sequence(kind, frames, seed);
             scenario.name = (*name).to_owned();
             run(&scenario, &mut tallies[kind])?;

@@ -61,19 +61,19 @@ struct Expected {
     first: Option<(Pose, Naming)>,
     /// At constant velocity.
     steady: Option<(Pose, Naming)>,
-    /// As the picture flowed.
-    flowed: Option<(Pose, Naming)>,
+    /// As the picture flowed, and whether no other cell was as likely by that.
+    flowed: Option<(Pose, bool)>,
     /// As if nothing had moved.
-    rest: Option<(Pose, Naming)>,
+    rest: Option<Pose>,
 }
 
 impl Expected {
     /// With a prior: whether another witness that is sure of itself gives other names.
     fn contradicts(&self, named: &LatticeEstimate) -> bool {
-        let other = |(pose, naming): &(Pose, Naming)| {
-            *naming == Naming::Sure && named.counted_on(pose).is_some_and(|(other, _)| !same_names(&other, named))
-        };
-        self.by_prior && (self.steady.as_ref().is_some_and(other) || self.flowed.as_ref().is_some_and(other))
+        let other = |pose: &Pose| named.counted_on(pose).is_some_and(|(other, _)| !same_names(&other, named));
+        let steady = self.steady.filter(|(_, naming)| *naming == Naming::Sure).map(|(pose, _)| pose);
+        let flowed = self.flowed.filter(|(_, alone)| *alone).map(|(pose, _)| pose);
+        self.by_prior && (steady.as_ref().is_some_and(other) || flowed.as_ref().is_some_and(other))
     }
 }
 
@@ -83,8 +83,10 @@ fn name(estimate: LatticeEstimate, expected: &Expected) -> (LatticeEstimate, Nam
         let (named, off) = estimate.counted_on(&pose)?;
         Some((named, if off < COUNTED_ON_CELLS { naming } else { Naming::Guess }))
     };
-    let by = |witness: Option<(Pose, Naming)>| witness.and_then(named);
-    let found = by(expected.first).or_else(|| by(expected.flowed)).or_else(|| by(expected.rest));
+    // The flow is sure of itself too often where a net behind moves along.
+    let guess = |pose: Option<Pose>| pose.and_then(|pose| named((pose, Naming::Guess)));
+    let found = expected.first.and_then(named);
+    let found = found.or_else(|| guess(expected.flowed.map(|(pose, _)| pose))).or_else(|| guess(expected.rest));
     found.unwrap_or((estimate, Naming::New))
 }
 
@@ -194,7 +196,7 @@ impl LatticeMethod {
         };
         let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, by_velocity));
         let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
-        let rest = recent.map(|(_, last)| (last.pose, Naming::Guess));
+        let rest = recent.map(|(_, last)| last.pose);
         // A vague prior is worth less than a velocity.
         let vague = prior.filter(|(_, naming)| *naming == Naming::Guess);
         let first = prior.filter(|(_, naming)| *naming == Naming::Sure).or(steady).or(vague);
@@ -209,11 +211,11 @@ impl LatticeMethod {
     /// Where the net may be as the picture flowed.
     fn flow(&mut self, image: GrayView<'_>, expected: &mut Expected) -> Result<()> {
         let step = self.flow.update(image, &Hints::default())?.step;
-        let naming = if step.status == Status::Tracked { Naming::Sure } else { Naming::Guess };
+        let alone = step.status == Status::Tracked;
         if let (Some(motion), Some((_, last)), true) =
             (step.motion, &self.last, expected.rest.is_some() && self.gapless())
         {
-            expected.flowed = self.pose_after(last, &motion).map(|pose| (pose, naming));
+            expected.flowed = self.pose_after(last, &motion).map(|pose| (pose, alone));
         }
         Ok(())
     }
