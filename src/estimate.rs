@@ -1,5 +1,5 @@
 use net_geometry::nalgebra::{Matrix6, Vector3};
-use net_geometry::{Junction, Pose};
+use net_geometry::{Junction, Mesh, Pose};
 use net_junction::Twine;
 
 /// Whether there is a net, and a pose that can be relied on.
@@ -75,6 +75,16 @@ pub struct NetPose {
     pub sheet: Option<Sheet>,
 }
 
+impl NetPose {
+    /// The same net with `cells` added to the names of its nodes: for frames in doubt, once that is settled ([`Estimate::corrected`]).
+    pub fn renumbered(&self, cells: (i32, i32), mesh: &Mesh) -> Self {
+        let (i, j) = (f64::from(cells.0) * mesh.side1(), f64::from(cells.1) * mesh.side2());
+        let (sin, cos) = self.sheet.map_or(mesh.angle(), |sheet| sheet.crossing_angle).sin_cos();
+        let moved = self.pose.rotation * Vector3::new(i + j * cos, j * sin, 0.0);
+        Self { pose: Pose { translation: self.pose.translation - moved, ..self.pose }, ..*self }
+    }
+}
+
 /// How a net hangs: its meshes sheared, the sheet bent. At the optical axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheet {
@@ -111,9 +121,10 @@ pub struct Estimate<'a> {
     pub track: u32,
     /// How that count goes on from the frames before; of frames with a pose.
     pub connection: Connection,
-    /// Cells that were added to the names of this frame's nodes, which had been carried on from the frame before. If the connection is [`Connection::Settled`], the frames
-    /// in doubt are explained too: of n frames, this one among them, the k-th was named with k n-ths of this too little. Zero where a place was recognised or a count begun.
+    /// Cells that were added to the names of this frame's nodes, which had been carried on from the frame before. Zero where a place was recognised or a count begun.
     pub corrected: (i32, i32),
+    /// Which frame of a doubt this is, from 1; 0 without. The one that settles it, the n-th, explains those before: the k-th was named with k n-ths of its `corrected` too little.
+    pub in_doubt: u32,
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
     /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].

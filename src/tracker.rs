@@ -95,7 +95,8 @@ impl Tracker {
             Engine::Thesis(method) => method.update(image, &mut self.junctions)?,
         };
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
-        let (connection, corrected) = found.map_or((Connection::Followed, (0, 0)), |f| (f.connection, f.corrected));
+        let connection = found.map_or(Connection::Followed, |f| f.connection);
+        let (corrected, in_doubt) = found.map_or(((0, 0), 0), |f| (f.corrected, f.in_doubt));
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
         let status = if net.is_some() { Status::Ok } else { Status::NoNet };
         self.layers.clear();
@@ -113,7 +114,7 @@ impl Tracker {
             _ => &[],
         };
         let (junctions, layers) = (&self.junctions, &self.layers);
-        Ok(Estimate { status, probability, net, track, connection, corrected, junctions, twines, layers })
+        Ok(Estimate { status, probability, net, track, connection, corrected, in_doubt, junctions, twines, layers })
     }
 
     /// Where a point of the lattice (fractions included) is in the last frame that had a pose: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as

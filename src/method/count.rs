@@ -32,6 +32,8 @@ pub(super) struct Counted {
     /// To be added to those of the frame before, for a velocity that is right.
     pub cells_before: (i32, i32),
     pub connection: Connection,
+    /// Which frame of a doubt this is, from 1; 0 without.
+    pub in_doubt: u32,
     /// Whether the vote was certain.
     pub proven: bool,
 }
@@ -132,7 +134,7 @@ impl CellCount {
         if let (Some(doubt), Some(cells)) = (doubt, vote.correction()) {
             // All frames in doubt are explained by one velocity that was wrong, or right: the count before goes on.
             self.track = doubt.home;
-            return Counted { cells_before, ..told(cells, Connection::Settled) };
+            return Counted { cells_before, in_doubt: vote.frames, ..told(cells, Connection::Settled) };
         }
         match (naming, vote.correction()) {
             (Naming::New, _) => self.find_or_restart(minus(self.middle, middle)),
@@ -159,7 +161,7 @@ impl CellCount {
         if vote.verdict == Verdict::Ambiguous && vote.dropped == 0 && vote.frames == frames {
             self.doubt = Some(Doubt { home, frames });
             self.begin();
-            return told((0, 0), Connection::Doubted);
+            return Counted { in_doubt: frames, ..told((0, 0), Connection::Doubted) };
         }
         self.put_aside(home, (0, 0));
         self.begin();
@@ -234,7 +236,7 @@ impl CellCount {
 }
 
 fn told(cells: (i32, i32), connection: Connection) -> Counted {
-    Counted { cells, cells_before: (0, 0), connection, proven: false }
+    Counted { cells, cells_before: (0, 0), connection, in_doubt: 0, proven: false }
 }
 
 fn plus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {

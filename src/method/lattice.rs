@@ -160,12 +160,12 @@ impl LatticeMethod {
             return Ok(None);
         };
         let vouched = estimate.probability >= self.threshold;
-        let (mut connection, mut corrected) = (Connection::Followed, (0, 0));
+        let (mut connection, mut corrected, mut in_doubt) = (Connection::Followed, (0, 0), 0);
         if vouched {
             self.list_junctions(image, &estimate, junctions)?;
             let counted = self.count_cells(&estimate, naming, junctions);
             estimate = estimate.renumbered(counted.cells);
-            connection = counted.connection;
+            (connection, in_doubt) = (counted.connection, counted.in_doubt);
             if matches!(connection, Connection::Followed | Connection::Settled) {
                 corrected = counted.cells;
             }
@@ -177,7 +177,7 @@ impl LatticeMethod {
         if vouched {
             self.last = Some((timestamp_ns, estimate));
         }
-        Ok(Some(Found { net, probability, track, connection, corrected }))
+        Ok(Some(Found { net, probability, track, connection, corrected, in_doubt }))
     }
 
     /// Where the net may be, from the surest witness to the least; the flow, which takes its time, is not asked yet.

@@ -19,6 +19,8 @@ pub(crate) struct Found {
     pub connection: Connection,
     /// [`crate::Estimate::corrected`].
     pub corrected: (i32, i32),
+    /// [`crate::Estimate::in_doubt`].
+    pub in_doubt: u32,
 }
 
 /// Numbers the counts of cells: each has an origin of its own.

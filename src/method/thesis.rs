@@ -114,6 +114,7 @@ impl ThesisMethod {
             track: self.track.number(),
             connection: self.connection,
             corrected: (0, 0),
+            in_doubt: 0,
         }
     }
 }

@@ -6,10 +6,10 @@ use crate::config::Config;
 use crate::frame::{Seen, TwineLook};
 use crate::tile::Twine;
 
-/// Least contrast, deviations, at which a frame says anything.
-const GATE: f32 = 1.5;
-/// What a frame that does not call the twine present or missing may say at the most, either way.
-const DOUBTFUL: (f32, f32) = (-1.5, 3.0);
+/// Least contrast, deviations, at which a frame says anything. Where twine is faint, chance lifts it above a higher one, and chance is all that is then looked at.
+const GATE: f32 = 0.8;
+/// What a frame that does not call the twine present or missing may say at the most, either way: the same both ways, or faint twines would never add up.
+const DOUBTFUL: f32 = 3.0;
 
 impl Twine {
     /// Adds a frame. Frames of one look are averaged: the camera has hardly moved, and what disturbs one disturbs all.
@@ -20,7 +20,7 @@ impl Twine {
                 return;
             }
             _ if !(look.llr.is_finite() && look.contrast > GATE) => return,
-            Seen::Unknown => look.llr.clamp(DOUBTFUL.0, DOUBTFUL.1),
+            Seen::Unknown => look.llr.clamp(-DOUBTFUL, DOUBTFUL),
             Seen::Present | Seen::Missing => look.llr,
         };
         if look.seen == Seen::Missing {
@@ -86,10 +86,10 @@ mod tests {
         twine.add(&look(-20.0, Seen::Hidden), 0, Vector2::zeros(), &config);
         twine.add(&look(-20.0, Seen::Fouled), 1, Vector2::zeros(), &config);
         twine.add(&look(f32::NAN, Seen::Missing), 2, Vector2::zeros(), &config);
-        twine.add(&TwineLook { contrast: 1.0, ..look(-20.0, Seen::Missing) }, 3, Vector2::zeros(), &config);
+        twine.add(&TwineLook { contrast: 0.5, ..look(-20.0, Seen::Missing) }, 3, Vector2::zeros(), &config);
         assert_eq!((twine.llr(&config), twine.looks, twine.covered), (0.0, 0, 2));
         // A frame in doubt counts little.
         twine.add(&look(-20.0, Seen::Unknown), 4, Vector2::zeros(), &config);
-        assert_eq!(twine.llr(&config), -1.5);
+        assert_eq!(twine.llr(&config), -3.0);
     }
 }

@@ -13,6 +13,7 @@ use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
 use netpose::{Connection, Tracker};
 
+use super::doubt::share;
 use super::frames::Tracked;
 
 /// The columns of `count.csv`.
@@ -44,11 +45,12 @@ struct Named {
     track: u32,
     connection: Connection,
     corrected: (i32, i32),
+    in_doubt: u32,
 }
 
 impl From<&Tracked> for Named {
     fn from(t: &Tracked) -> Self {
-        Self { track: t.track, connection: t.connection, corrected: t.corrected }
+        Self { track: t.track, connection: t.connection, corrected: t.corrected, in_doubt: t.in_doubt }
     }
 }
 
@@ -64,6 +66,8 @@ pub struct Counted {
     pub offset: (i32, i32),
     said: Said,
     z: f64,
+    /// Which of the frames in doubt this is to the tracker, from 1; 0 if it is none.
+    doubt: u32,
     /// Whether this is certain: an undecided frame is left out of the map.
     pub sure: bool,
 }
@@ -147,10 +151,22 @@ impl Count {
         image: GrayView<'_>,
         pixel: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Result<Counted> {
+        if named.connection == Connection::Settled {
+            // The doubted are written by the right names, so that nothing is to be added to them for that.
+            for doubted in self.doubted.iter_mut().filter(|d| d.doubt > 0) {
+                doubted.offset = minus(doubted.offset, share(named.corrected, doubted.doubt, named.in_doubt));
+                doubted.track = named.track;
+            }
+        }
         let changed = matches!(named.connection, Connection::Restarted | Connection::Recognised);
         if changed && !self.doubted.is_empty() {
             // What has been added up was about another count.
             self.break_off()?;
+        }
+        if named.in_doubt == 1 {
+            // What was added up before was about something else.
+            self.give_up()?;
+            self.vote.drop_doubt();
         }
         // As the names were before the tracker corrected them: what frames in doubt add up to is to be found here too.
         let mut offset = minus(self.offset, named.corrected);
@@ -168,7 +184,8 @@ impl Count {
             result = vote(self, offset);
         }
         let track = named.track;
-        let broken = result.verdict == Verdict::Decided && result.dropped > 0;
+        // Doubt that was longer than the memory breaks the count, unless the tracker's names were right in the end.
+        let broken = result.dropped > 0 && result.correction().is_some_and(|cells| changed || cells != (0, 0));
         let begins = result.verdict == Verdict::Started && self.age > 0;
         if broken || begins || result.verdict == Verdict::Blind {
             self.give_up()?;
@@ -202,7 +219,8 @@ impl Count {
             self.vote.remember(&mut self.map);
             self.middle = plus(middle, self.offset);
         }
-        let counted = Counted { frame, track, stretch: self.stretch, offset: self.offset, said, z, sure };
+        let (stretch, doubt) = (self.stretch, named.in_doubt);
+        let counted = Counted { frame, track, stretch, offset: self.offset, said, z, doubt, sure };
         if sure || result.verdict == Verdict::Blind {
             self.write(&counted)?;
         } else {
@@ -348,7 +366,7 @@ mod tests {
             let (track, corrected) = (u32::from(frame >= 2) + u32::from(frame >= 8), (0, 0));
             let begun = matches!(frame, 2 | 8);
             let connection = if begun { Connection::Restarted } else { Connection::Followed };
-            let named = Named { track, connection, corrected };
+            let named = Named { track, connection, corrected, in_doubt: 0 };
             let view = image.view().expect("pixels");
             counted.push(count.step(u64::from(frame.unsigned_abs()), &named, middle, view, pixel).expect("written"));
         }

@@ -11,6 +11,7 @@ use netpose::{Camera, Config, Connection, Error, Layer, Mesh, NetPose, Status, T
 
 use super::ahead::in_order;
 use super::count::{self, Count};
+use super::doubt::HeldBack;
 use super::folder::{Ended, Finished, Folder};
 use super::layers::{self, LayersCsv};
 use super::overlays::Overlays;
@@ -63,6 +64,8 @@ pub struct Tracked {
     pub connection: Connection,
     /// Cells that were added to the names of nodes.
     pub corrected: (i32, i32),
+    /// Which frame of a doubt this is.
+    pub in_doubt: u32,
     pub net: Option<NetPose>,
     pub junctions: Vec<netpose::Junction>,
     pub twines: Vec<netpose::Twine>,
@@ -106,6 +109,7 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
     }
     let mut layers = job.config.layers.then(|| LayersCsv::create(&job.out)).transpose()?;
     let mut map = job.map.then(|| NetMap::new(&job.out, job.mesh)).transpose()?;
+    let mut held_back = HeldBack::default();
     // No frame has shown yet that the calibration is this camera's.
     let mut size_confirmed = done.is_some();
 
@@ -119,7 +123,7 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
                 Ok(image) => track(&mut tracker, image, &frame, &mut size_confirmed)?,
                 Err(why) => Err(why.clone()),
             };
-            folder.write(&frame, time, tracked.as_ref().map_err(String::as_str))?;
+            held_back.write(&mut folder, &job.mesh, &frame, time, tracked.as_ref().map_err(String::as_str))?;
             match (&tracked, image) {
                 (Ok(tracked), Ok(image)) => {
                     if let (Some(count), Some(_), Some(view)) = (&mut count, &tracked.net, image.view())
@@ -144,6 +148,7 @@ pub fn process(mut log: Log, job: &Job, mut folder: Folder, interrupt: &Interrup
         overlays.map_or(Ok(()), Overlays::finish).map(|()| Ended::AtTheEnd)
     });
     progress.finish();
+    let ended = held_back.flush(&mut folder).and(ended);
     for damage in log.damage() {
         eprintln!("warning: {damage}");
     }
@@ -173,6 +178,7 @@ fn track(
             track: estimate.track,
             connection: estimate.connection,
             corrected: estimate.corrected,
+            in_doubt: estimate.in_doubt,
             net: estimate.net,
             latency: start.elapsed(),
             junctions: estimate.junctions.to_vec(),

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod count;
+mod doubt;
 mod examples;
 mod folder;
 mod frames;
