@@ -22,22 +22,32 @@ struct World {
     image: Image<u8>,
     tracker: Tracker,
     frame: i64,
+    /// Displacement of the knots, cells, and the sensor's noise, grey levels.
+    jitter: f64,
+    noise_grey: f64,
 }
 
 impl World {
     fn new() -> Self {
         let camera = Camera::new(320.0, 320.0, 211.5, 119.5, 424, 240, Lens::None).unwrap();
         let tracker = Tracker::new(camera, Mesh::square(CELL_M).unwrap(), &Config::default()).unwrap();
-        Self { simulator: Simulator::new(camera), image: Image::default(), tracker, frame: 0 }
+        Self {
+            simulator: Simulator::new(camera),
+            image: Image::default(),
+            tracker,
+            frame: 0,
+            jitter: 0.04,
+            noise_grey: 2.0,
+        }
     }
 
     /// A frame at `x_m` along the net, or of open water; the prior's motion and standard deviations.
     fn frame(&mut self, x_m: Option<f64>, prior: Option<MotionPrior>) -> Estimate<'_> {
-        let net = Net { jitter: 0.04, seed: 5, ..Net::default() };
+        let net = Net { jitter: self.jitter, seed: 5, ..Net::default() };
         let layers = x_m.map(|x| Layer { net, pose: NetPose::from_pose(&pose(x)).unwrap() });
         let scene = Scene {
             layers: layers.into_iter().collect(),
-            sensor: Sensor { read_noise_grey: 2.0, ..Sensor::default() },
+            sensor: Sensor { read_noise_grey: self.noise_grey, ..Sensor::default() },
             ..Scene::default()
         };
         self.simulator.render(&scene, 77 + self.frame.unsigned_abs(), &mut self.image).unwrap();
@@ -167,4 +177,35 @@ fn what_is_no_motion_is_refused_and_leaves_the_tracker_as_it_was() {
     let (view, time) = (world.image.view().unwrap(), (world.frame + 1) * FRAME_NS);
     assert!(matches!(world.tracker.update_with_prior(view, time, &broken), Err(netpose::Error::Prior { .. })));
     assert_eq!(place(&world.tracker.update(view, time).unwrap()).1, before.1);
+}
+
+#[test]
+fn a_run_begun_at_a_cell_a_frame_is_one_count_and_says_where_it_doubted() {
+    // Nothing tells the first step: the lattice names it by less than half a cell, and is wrong.
+    let truth: Vec<f64> = (0..10).map(|k| f64::from(k) * 0.9 * CELL_M).collect();
+    // So little disorder and so much noise that one look does not tell either.
+    let mut world = World { jitter: 0.02, noise_grey: 12.0, ..World::new() };
+    let (mut found, mut doubted, mut doubts) = (Vec::new(), Vec::new(), 0);
+    for x in &truth {
+        let estimate = world.frame(Some(*x), None);
+        let seen = (place(&estimate), estimate.connection, estimate.net.unwrap());
+        let (corrected, n) = (estimate.corrected, estimate.in_doubt);
+        if seen.1 == Connection::Settled {
+            // What the settlement says of the frames before it makes them right.
+            for (at, k) in doubted.drain(..) {
+                let cells = (corrected.0 * k as i32 / n as i32, corrected.1 * k as i32 / n as i32);
+                let (_, net): &((f64, u32), netpose::NetPose) = &found[at];
+                let net = net.renumbered(cells, &Mesh::square(CELL_M).unwrap());
+                found[at] = ((net.pose.camera_in_net().x, seen.0.1), net);
+            }
+        }
+        if seen.1 == Connection::Doubted {
+            doubted.push((found.len(), n));
+            doubts += 1;
+        }
+        found.push((seen.0, seen.2));
+    }
+    let places: Vec<_> = found.iter().map(|f| f.0).collect();
+    assert_eq!(silent_and_flagged(&places, &truth), (0, 0), "{places:?}");
+    assert!(doubts > 0, "{places:?}");
 }
