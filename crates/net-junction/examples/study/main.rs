@@ -100,8 +100,7 @@ impl Kind {
             match estimate {
                 None => self.refused += 1,
                 Some(estimate) => {
-                    let map = EstimatedMap { estimate: &estimate, camera: &sample.camera };
-                    adjuster.adjust(view, &map)?;
+                    adjuster.adjust(view, &EstimatedMap { estimate: &estimate, camera: &sample.camera })?;
                     let found = score(&adjuster, sample, &map, config.cell_min_px, true);
                     eprintln!("{:<28} {found} from an estimate", "");
                     self.estimated.add(found);

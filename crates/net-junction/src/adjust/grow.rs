@@ -3,7 +3,7 @@
 use net_geometry::nalgebra::Vector2;
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::{Graph, median};
+use crate::adjust::graph::{Graph, median, upper};
 use crate::adjust::locate::{kernel_for, reach_px, sign, vertex};
 use crate::adjust::map::LatticeMap;
 use crate::adjust::profile::{COARSE_PX, Source};
@@ -20,6 +20,12 @@ const NEAR_CELLS: f64 = 0.12;
 const BETTER: f64 = 1.15;
 /// Where no twine would move farther than this, cells, there is nothing to compare.
 const SMALL_CELLS: f64 = 0.1;
+
+/// Growth begins where every third twine of the list shows half of what is seen where the net is.
+const ORIGIN_STRIDE: usize = 3;
+const ORIGIN_PART: f32 = 0.5;
+/// Fewer twines than that have too much in common by chance.
+const ORIGIN_FEWEST: f32 = 6.0;
 
 /// A twine on the list, and how it was sampled.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +54,8 @@ pub(crate) struct Grower {
     sum: Vec<f32>,
     strongest: Vec<f32>,
     signs: Vec<f32>,
+    /// By block: amplitude of what all twines around have in common.
+    strengths: Vec<f32>,
     /// Offset, px, and amplitude of each sampled twine.
     picked: Vec<(f64, f32)>,
     measured: Vec<Measured>,
@@ -66,8 +74,11 @@ impl Grower {
     ) -> Warp {
         let mut warp = Warp::none(seed);
         let Some(cell) = graph.nodes.first().map(|n| n.height) else { return warp };
-        self.list(graph, seed, config);
+        self.list(graph, config);
         let steps = self.steps();
+        let seed = self.origin(source, graph, seed, steps, look);
+        warp = Warp::none(seed);
+        self.twines.iter_mut().for_each(|t| t.radius = (t.from - seed).norm());
         for (round, radius) in radii(cell, diagonal).enumerate() {
             for k in 0..self.twines.len() {
                 if self.twines[k].radius <= radius && self.twines[k].warped.is_nan() {
@@ -95,7 +106,7 @@ impl Grower {
         warp
     }
 
-    fn list(&mut self, graph: &Graph, seed: Vector2<f64>, config: &AdjustConfig) {
+    fn list(&mut self, graph: &Graph, config: &AdjustConfig) {
         // Odd: both families in turn.
         let stride = graph.edges.len().div_ceil(TWINES) | 1;
         self.kernels.start(COARSE_PX);
@@ -110,13 +121,39 @@ impl Grower {
                 self.twines.push(Twine {
                     edge: e as u32,
                     from,
-                    radius: (from - seed).norm(),
+                    radius: 0.0,
                     warped: f64::NAN,
                     normal: Vector2::zeros(),
                     reach: reach_px(graph, e, config.search_cells[0]),
                 });
             }
         }
+    }
+
+    /// Where growth begins: the place nearest to the seed where twine stands out. The seed itself may lie beyond the net's end.
+    fn origin(
+        &mut self,
+        source: &Source,
+        graph: &Graph,
+        seed: Vector2<f64>,
+        steps: usize,
+        look: &Look,
+    ) -> Vector2<f64> {
+        let none = Warp::none(seed);
+        for k in (0..self.twines.len()).step_by(ORIGIN_STRIDE) {
+            self.sample(source, graph, k, steps, &none, look);
+        }
+        self.settle_signs(graph, steps);
+        self.strongest.clear();
+        self.strongest.extend(self.strengths.iter().filter(|&&s| s > 0.0));
+        let least = ORIGIN_PART * upper(&mut self.strongest).unwrap_or(0.0);
+        let stands_out = |t: &&Twine| self.strengths[graph.blocks.of_edge(t.edge as usize)] >= least;
+        let away = |t: &&Twine| (t.from - seed).norm_squared();
+        let near = self.twines.iter().filter(stands_out).min_by(|a, b| away(a).total_cmp(&away(b)));
+        let origin = near.map_or(seed, |t| t.from);
+        self.twines.iter_mut().for_each(|t| t.warped = f64::NAN);
+        self.responses.fill(0.0);
+        origin
     }
 
     /// Offsets on each side.
@@ -149,30 +186,40 @@ impl Grower {
         (twine.normal, twine.warped) = (normal, normal.dot(&warp.at(twine.from)));
     }
 
-    /// Where the sampled twines lie.
-    fn pick(&mut self, graph: &Graph, steps: usize) {
+    /// Whether twine is light or dark around each block, and how much of it there is.
+    fn settle_signs(&mut self, graph: &Graph, steps: usize) {
         let places = 2 * steps + 1;
-        let Self { twines, responses, row_of_edge, sum, strongest, signs, picked, measured, .. } = self;
+        let Self { twines, responses, row_of_edge, sum, strongest, signs, strengths, .. } = self;
         strongest.clear();
         let most = |row: &[f32]| row.iter().fold(0.0_f32, |most, a| most.max(a.abs()));
         let sampled = twines.iter().zip(responses.chunks_exact(places)).filter(|(t, _)| !t.warped.is_nan());
         strongest.extend(sampled.map(|(_, row)| most(row)).filter(|&a| a > 0.0));
         let limit = 1.5 * median(strongest).unwrap_or(0.0) + 1e-6;
         signs.clear();
+        strengths.clear();
         for block in 0..graph.blocks.count() {
             sum.clear();
             sum.resize(places, 0.0);
-            let mut reach = 0.0;
+            let (mut reach, mut count) = (0.0, 0.0_f32);
             if !graph.blocks.members(block).is_empty() {
                 for &e in graph.blocks.around(block).into_iter().flatten() {
                     let Some(t) = twines.get(row_of_edge[e as usize] as usize) else { continue };
                     let row = &responses[row_of_edge[e as usize] as usize * places..][..places];
                     sum.iter_mut().zip(row).for_each(|(s, a)| *s += a.clamp(-limit, limit));
                     reach = t.reach;
+                    count += f32::from(!t.warped.is_nan());
                 }
             }
             signs.push(sign(sum, reach / COARSE_PX as f32));
+            strengths.push(most(sum) / count.max(ORIGIN_FEWEST));
         }
+    }
+
+    /// Where the sampled twines lie.
+    fn pick(&mut self, graph: &Graph, steps: usize) {
+        self.settle_signs(graph, steps);
+        let places = 2 * steps + 1;
+        let Self { twines, responses, strongest, signs, picked, measured, .. } = self;
         picked.clear();
         strongest.clear();
         for (twine, row) in twines.iter().zip(responses.chunks_exact(places)) {
