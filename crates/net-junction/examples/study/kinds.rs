@@ -28,6 +28,12 @@ pub const KINDS: &[(&str, Make)] = &[
     ("motion blur of 8 px", |s| make(s, 0.5, motion)),
     (GRID, |_| Scenario::by_name("fig-5.6").unwrap_or_default()),
     ("net's end", |s| make(s, 0.5, end)),
+    ("water alone", |s| {
+        make(s, 0.5, |draw, scene| {
+            scene.sensor.read_noise_grey = draw.between(6.0, 12.0);
+            scene.layers[0].net.twine.diameter_m = 1e-5;
+        })
+    }),
     ("holes, flat", |s| make(s, 0.5, tear)),
     ("holes, bent", |s| {
         make(s, 0.5, |draw, scene| {

@@ -10,6 +10,7 @@ use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
 use crate::adjust::presence::{Presence, Twine, TwineState};
 use crate::adjust::profile::{COARSE_PX, FINE_PX, Profiles, Source};
+use crate::adjust::seen::{Witnesses, own_twines};
 use crate::adjust::solve::Solver;
 use crate::adjust::template::Look;
 use crate::error::{Error, Result};
@@ -19,10 +20,6 @@ const SIGMA_MIN_PX: f64 = 0.03;
 /// Standard deviation of the distance, in twine diameters, between a twine's axis and the middle of its brightness: light from
 /// above makes the upper flank of white twine bright. Thin twine does not tell.
 const SHADING: f64 = 0.12;
-/// Log odds that twine in the middle of a net is there, and the part of the gate that its neighbourhood must stand out by: fewer
-/// twines are broken than that.
-const LIKELY_PRIOR: f64 = 2.0;
-const LIKELY_GATE: f64 = 0.7;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
 const ROUNDS: [usize; 2] = [4, 3];
 
@@ -39,6 +36,7 @@ pub struct NetAdjuster {
     locator: Locator,
     solver: Solver,
     presence: Presence,
+    witnesses: Witnesses,
     connector: Connector,
     values: Vec<f32>,
     junctions: Vec<Junction>,
@@ -68,6 +66,7 @@ impl NetAdjuster {
             locator: Locator::default(),
             solver: Solver::default(),
             presence: Presence::default(),
+            witnesses: Witnesses::default(),
             connector: Connector::default(),
             values: Vec::new(),
             junctions: Vec::new(),
@@ -155,7 +154,8 @@ impl NetAdjuster {
         let beside = ((0.6 * width + 0.5).max(1.0) + 0.5 * blur) / FINE_PX;
         presence.judge(graph, &locator.profiles, source, image, half, beside.round() as usize, config);
         // 5. As far as names can be trusted.
-        self.connector.walk(&self.graph, &self.presence.twines);
+        self.witnesses.judge(graph, &presence.twines, &presence.votes, config);
+        self.connector.walk(&self.graph, &self.presence.twines, &self.witnesses);
         self.report();
         Ok(&self.junctions)
     }
@@ -176,30 +176,16 @@ impl NetAdjuster {
     }
 
     fn report(&mut self) {
-        let (present, gate) = (self.config.present_llr, self.config.gate);
         for (k, node) in self.graph.nodes.iter().enumerate() {
             if !self.connector.reached(k) || !node.inside {
                 continue;
             }
-            let (i, j) = node.index;
-            let before = [(i - 1, j), (i, j - 1)];
-            let at = |n: usize, family: usize| {
-                let edge = self.graph.edge_from(n, family)?;
-                Some(self.presence.twines[edge])
-            };
-            let twines = [0, 1].map(|f| [at(k, f), self.graph.node_at(before[f]).and_then(|n| at(n, f))]);
+            let twines = own_twines(&self.graph, k).map(|edges| edges.map(|e| Some(self.presence.twines[e?])));
             let any = |family: usize, state: TwineState| twines[family].iter().flatten().any(|t| t.state == state);
-            // Twine that is likely on both sides of the knot is as good as one that is certain.
-            let seen = |family: usize| {
-                let open = twines[family].iter().flatten().filter(|t| t.state == TwineState::Unknown);
-                let likely =
-                    open.filter(|t| f64::from(t.contrast) > LIKELY_GATE * gate).map(|t| f64::from(t.llr)).sum::<f64>();
-                any(family, TwineState::Present) || likely + LIKELY_PRIOR > present
-            };
             let either = |state: TwineState| any(0, state) || any(1, state);
             let missing = twines.iter().flatten().flatten().filter(|t| t.state == TwineState::Missing).count();
             let known = twines.iter().flatten().flatten().count();
-            let state = if seen(0) && seen(1) {
+            let state = if self.witnesses.saw(k) {
                 JunctionState::Seen
             } else if either(TwineState::Hidden) {
                 JunctionState::Hidden

@@ -10,6 +10,7 @@ use net_geometry::nalgebra::Vector2;
 
 use crate::adjust::graph::Graph;
 use crate::adjust::presence::{Twine, TwineState};
+use crate::adjust::seen::Witnesses;
 
 /// How much the displacements of a twine's ends may differ, cells: on twine that is seen, and across what is not.
 const SEEN_CELLS: f64 = 0.25;
@@ -28,15 +29,15 @@ impl Connector {
         self.reached[node]
     }
 
-    /// Walks from the node with a present twine that is nearest to the graph's first node, which is next to the seed.
-    pub fn walk(&mut self, graph: &Graph, twines: &[Twine]) {
+    /// Walks from the seen node that is nearest to the graph's first node, which is next to the seed.
+    pub fn walk(&mut self, graph: &Graph, twines: &[Twine], witnesses: &Witnesses) {
         self.reached.clear();
         self.reached.resize(graph.nodes.len(), false);
         self.queue.clear();
         let Some(seed) = graph.nodes.first().map(|n| n.predicted) else { return };
         let distance = |n: u32| (graph.nodes[n as usize].predicted - seed).norm_squared();
-        let present = graph.edges.iter().zip(twines).filter(|(_, t)| t.state == TwineState::Present);
-        let nearest = present.map(|(e, _)| e.nodes[0]).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        let seen = (0..graph.nodes.len() as u32).filter(|&n| witnesses.saw(n as usize));
+        let nearest = seen.min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
         let Some(start) = nearest else { return };
         self.reached[start as usize] = true;
         self.queue.push_back(start);
@@ -47,7 +48,9 @@ impl Connector {
                 let Some(edge) = graph.node_at(index).and_then(|n| graph.edge_from(n, family)) else { continue };
                 let [a, b] = graph.edges[edge].nodes;
                 let other = if a == node { b } else { a };
-                let allowed = if twines[edge].state == TwineState::Present { SEEN_CELLS } else { UNSEEN_CELLS };
+                let seen = twines[edge].state == TwineState::Present
+                    || witnesses.saw(node as usize) && witnesses.saw(other as usize);
+                let allowed = if seen { SEEN_CELLS } else { UNSEEN_CELLS };
                 if !self.reached[other as usize] && apart(graph, a, b) < allowed {
                     self.reached[other as usize] = true;
                     self.queue.push_back(other);

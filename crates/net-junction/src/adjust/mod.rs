@@ -11,6 +11,7 @@ mod map;
 mod outside;
 mod presence;
 mod profile;
+mod seen;
 mod solve;
 mod template;
 mod warp;

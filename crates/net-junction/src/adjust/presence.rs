@@ -25,6 +25,9 @@ const FLAT_TOP: f32 = 0.8;
 /// Structure beside a weak twine, in parts of the control lines', beyond which it is growth and no gap.
 const CLUTTER: f32 = 2.0;
 
+/// Most that one twine says of whether there is a net around it.
+const VOTE_MAX: f32 = 2.0;
+
 /// What is known of a twine between two neighbouring nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TwineState {
@@ -76,6 +79,8 @@ pub(crate) struct Presence {
     typical: Vec<f32>,
     covered: Vec<f32>,
     outside: Outside,
+    /// By edge: log likelihood ratio, net to no net, of the whole twine by normal densities, limited; NaN outside the picture.
+    pub votes: Vec<f32>,
     /// The twines, in the graph's order.
     pub twines: Vec<Twine>,
 }
@@ -218,7 +223,8 @@ impl Presence {
         self.amplitudes.clone_from(&lines.whole.values);
     }
 
-    /// Learned templates fit whatever neighbours have in common, also twine beside the line: its extreme must lie on the line.
+    /// Learned templates fit whatever neighbours have in common, also twine beside the line: what differs most from the template's ends must
+    /// lie on the line.
     fn centre(&mut self, half: usize, beside: usize) {
         self.centred.clear();
         let energy = |template: &[f32]| template.iter().map(|t| t * t).sum::<f32>();
@@ -226,13 +232,16 @@ impl Presence {
         self.row.extend(self.templates.chunks_exact(2 * half + 1).map(energy).filter(|&e| e > 0.0));
         let least = LEAST_ENERGY * upper(&mut self.row).unwrap_or(0.0);
         for template in self.templates.chunks_exact(2 * half + 1) {
-            let smooth = |k: usize| template[k - 1] + 2.0 * template[k] + template[k + 1];
+            // Broad twine reaches far to both sides: beyond it is zero, not at the mean.
+            let end = 0.5 * (template[0] + template[2 * half]);
+            let smooth = |k: usize| 0.25 * (template[k - 1] + 2.0 * template[k] + template[k + 1]) - end;
             let extreme =
                 (1..2 * half).map(smooth).fold(0.0_f32, |most, t| if t.abs() > most.abs() { t } else { most });
             let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
             // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
             let on_line = near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme);
-            self.centred.push(on_line && energy(template) > least);
+            let alike = (template[0] - template[2 * half]).abs() < extreme.abs();
+            self.centred.push(on_line && alike && energy(template) > least);
         }
     }
 
@@ -281,6 +290,7 @@ impl Presence {
         }
         graph.blocks.local_median(&self.control.structure, &mut self.control_structure);
         self.twines.clear();
+        self.votes.clear();
         for (e, edge) in graph.edges.iter().enumerate() {
             let index = graph.nodes[edge.nodes[0] as usize].index;
             let block = graph.blocks.of_edge(e);
@@ -323,6 +333,8 @@ impl Presence {
             };
             // None for what is outside the picture.
             let contrast = if self.valid[e] { contrast.max(whole_contrast) } else { 0.0 };
+            let vote = if known { vote(&self.twine.whole, &self.control.whole, e, block) } else { 0.0 };
+            self.votes.push(if self.valid[e] { vote } else { f32::NAN });
             self.twines.push(Twine { index, direction: edge.family, state, llr, contrast });
         }
     }
@@ -408,6 +420,14 @@ fn evidence(twine: &Statistic, control: &Statistic, edge: usize, block: usize) -
     // Stronger than usual twine is no less twine; weaker than no twine is no less missing.
     let x = twine.values[edge].min(p0).max(m0);
     (log_student(x, p0, sp) - log_student(x, m0, s0), (p0 - m0) / sp.hypot(s0))
+}
+
+/// Log likelihood ratio, twine to no twine, of normal densities of the same scatter, limited to [`VOTE_MAX`]: a sum of many needs no heavy tails.
+fn vote(twine: &Statistic, control: &Statistic, edge: usize, block: usize) -> f32 {
+    let (p0, m0) = (twine.typical[block], control.typical[block]);
+    let variance = 0.5 * (twine.spread[block].powi(2) + control.spread[block].powi(2));
+    let x = twine.values[edge] - 0.5 * (p0 + m0);
+    (x * (p0 - m0) / variance).clamp(-VOTE_MAX, VOTE_MAX)
 }
 
 /// Logarithm of Student's density with five degrees of freedom, up to a constant.
