@@ -1,11 +1,14 @@
 //! Junctions by adjusting a predicted lattice to the picture: a small bundle adjustment in the image plane.
 
 mod adjuster;
+mod appearance;
 mod blocks;
 mod config;
 mod connect;
+mod covered;
 mod graph;
 mod grow;
+mod lines;
 mod locate;
 mod map;
 mod outside;
@@ -13,6 +16,7 @@ mod presence;
 mod profile;
 mod seen;
 mod solve;
+mod statistic;
 mod template;
 mod warp;
 

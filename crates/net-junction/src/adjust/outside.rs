@@ -1,4 +1,4 @@
-//! Where the net ends: twines that are not there, in a region that no net encloses.
+//! What lies where twines are gone together: the net's end, where no net encloses them, or a fish, where most of them are hidden.
 
 use crate::adjust::graph::Graph;
 use crate::adjust::presence::{Twine, TwineState};
@@ -6,57 +6,76 @@ use crate::adjust::presence::{Twine, TwineState};
 /// Missing twines in a region that reaches the end of the picture, from which on it is the net's end and no hole.
 const TWINES: u32 = 8;
 
-/// Meshes that missing twines, and those of which nothing is told, join, each named after its first node.
+/// Hidden twines, at least as many as missing ones, that hide those too.
+const HIDDEN: u32 = 2;
+
+/// Meshes that twines which are not seen join, each named after its first node.
 #[derive(Debug, Default)]
 pub(crate) struct Outside {
     parent: Vec<u32>,
-    /// Missing twines of a region, and whether it reaches the end of the picture; kept at its root.
-    count: Vec<u32>,
+    /// Missing and hidden twines of a region, and whether it reaches the end of the picture; kept at its root.
+    missing: Vec<u32>,
+    hidden: Vec<u32>,
     open: Vec<bool>,
 }
 
 impl Outside {
-    /// Nothing is said of twines beyond the net's end.
+    /// Nothing is said of twines beyond the net's end, and what is missing amid hidden twines is hidden.
     pub fn mark(&mut self, graph: &Graph, twines: &mut [Twine]) {
+        // Farther out nothing is told. (Twines out of the picture have no contrast; they would join all of its end.)
+        let untold = |t: &Twine| t.state == TwineState::Unknown && t.llr <= 0.0 && t.contrast != 0.0;
+        self.join(graph, twines, |t| t.state == TwineState::Missing || untold(t));
+        self.change(graph, twines, TwineState::Unknown, |o, r| o.open[r] && o.missing[r] >= TWINES);
+        let covered = |t: &Twine| matches!(t.state, TwineState::Missing | TwineState::Hidden | TwineState::Fouled);
+        self.join(graph, twines, |t| covered(t) || untold(t));
+        self.change(graph, twines, TwineState::Hidden, |o, r| o.hidden[r] >= o.missing[r].max(HIDDEN));
+    }
+
+    /// Joins the meshes on both sides of the twines that belong.
+    fn join(&mut self, graph: &Graph, twines: &[Twine], belongs: impl Fn(&Twine) -> bool) {
         self.parent.clear();
         self.parent.extend(0..graph.nodes.len() as u32);
-        self.count.clear();
-        self.count.resize(graph.nodes.len(), 0);
+        for counts in [&mut self.missing, &mut self.hidden] {
+            counts.clear();
+            counts.resize(graph.nodes.len(), 0);
+        }
         self.open.clear();
         self.open.extend(graph.nodes.iter().map(|node| {
             let (i, j) = node.index;
             let corners = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
             !corners.into_iter().all(|c| graph.node_at(c).is_some_and(|n| graph.nodes[n].inside))
         }));
-        for twine in twines.iter() {
-            // Farther out nothing is told. (Twines out of the picture have no contrast; they would join all of its end.)
-            let missing = u32::from(twine.state == TwineState::Missing);
-            if missing == 0 && (twine.state != TwineState::Unknown || twine.llr > 0.0 || twine.contrast == 0.0) {
-                continue;
-            }
-            match beside(graph, twine) {
-                [Some(a), Some(b)] => {
-                    let (a, b) = (self.root(a), self.root(b));
-                    self.count[a] += missing;
-                    if a != b {
-                        self.parent[b] = a as u32;
-                        self.count[a] += self.count[b];
-                        self.open[a] |= self.open[b];
-                    }
+        for twine in twines.iter().filter(|t| belongs(t)) {
+            let [a, b] = beside(graph, twine).map(|cell| cell.map(|c| self.root(c)));
+            let Some(root) = a.or(b) else { continue };
+            self.missing[root] += u32::from(twine.state == TwineState::Missing);
+            self.hidden[root] += u32::from(matches!(twine.state, TwineState::Hidden | TwineState::Fouled));
+            match [a, b] {
+                [Some(a), Some(b)] if a != b => {
+                    self.parent[b] = a as u32;
+                    self.missing[a] += self.missing[b];
+                    self.hidden[a] += self.hidden[b];
+                    self.open[a] |= self.open[b];
                 }
-                [Some(a), None] | [None, Some(a)] => {
-                    let a = self.root(a);
-                    self.count[a] += missing;
-                    self.open[a] = true;
-                }
-                [None, None] => (),
+                [Some(_), Some(_)] => (),
+                _ => self.open[root] = true,
             }
         }
+    }
+
+    /// Gives another state to the missing twines of some regions, known by their roots.
+    fn change(
+        &mut self,
+        graph: &Graph,
+        twines: &mut [Twine],
+        state: TwineState,
+        concerned: impl Fn(&Self, usize) -> bool,
+    ) {
         for twine in twines.iter_mut().filter(|t| t.state == TwineState::Missing) {
             let Some(cell) = beside(graph, twine).into_iter().flatten().next() else { continue };
             let root = self.root(cell);
-            if self.open[root] && self.count[root] >= TWINES {
-                twine.state = TwineState::Unknown;
+            if concerned(self, root) {
+                twine.state = state;
             }
         }
     }

@@ -12,9 +12,9 @@ pub(crate) const FINE_PX: f64 = 0.5;
 const END: f32 = 0.03;
 /// Length of a bin along the twine, px, and the most bins of a twine.
 const BIN_PX: f32 = 3.0;
-const BINS_MAX: f32 = 12.0;
-/// Distance between samples along the twine, px: bilinear samples then touch every pixel.
-const ALONG_PX: f32 = 1.5;
+const BINS: (f32, f32) = (5.0, 12.0);
+/// Most distance between samples along the twine, px: bilinear samples then touch nearly every pixel.
+const ALONG_PX: f32 = 1.75;
 /// A picture coordinate's unit, 1/65536 px, and a fraction's, 1/256 px.
 const ONE: f32 = 65536.0;
 /// Most samples of a bin.
@@ -32,6 +32,8 @@ pub(crate) struct Profiles {
     pub half: usize,
     /// Distance between them, px.
     pub step_px: f64,
+    /// Median length of the twines, px.
+    pub length_px: f32,
     /// Middle of each bin, 0 to 1 along the twine.
     pub along: Vec<f32>,
     lengths: Vec<f32>,
@@ -69,7 +71,7 @@ impl Source {
         let length = chord.norm();
         let normal = Vector2::new(-chord.y, chord.x) / length;
         let share = (1.0 - 2.0 * END) / inside.len() as f32;
-        let samples = (length * share / ALONG_PX).round().clamp(1.0, SAMPLES_MAX) as usize;
+        let samples = (length * share / ALONG_PX).ceil().clamp(1.0, SAMPLES_MAX) as usize;
         let step = normal * step_px as f32;
         let back = step * (width / 2) as f32;
         let weight = 1.0 / samples as f32;
@@ -117,7 +119,9 @@ impl Profiles {
         self.lengths.clear();
         self.lengths.extend(graph.edges.iter().step_by(stride).map(|e| length(graph, e) as f32));
         let median = median(&mut self.lengths).unwrap_or(1.0);
-        self.bins = bins.unwrap_or((median / BIN_PX).clamp(1.0, BINS_MAX) as usize);
+        self.length_px = median;
+        self.bins =
+            bins.unwrap_or((median / BIN_PX).clamp(if step_px < COARSE_PX { BINS.0 } else { 1.0 }, BINS.1) as usize);
         self.along.clear();
         let share = (1.0 - 2.0 * END) / self.bins as f32;
         self.along.extend((0..self.bins).map(|b| END + share * (b as f32 + 0.5)));

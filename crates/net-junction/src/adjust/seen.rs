@@ -13,7 +13,7 @@ const REACH: i32 = 2;
 /// Contrast of the neighbourhood from which on twine speaks for itself, and does not need them.
 const STRONG_CONTRAST: f32 = 2.5;
 /// Least mean contrast around: water alone comes to 0.2 with a standard deviation of 0.15.
-const REGION_CONTRAST: f32 = 0.4;
+const REGION_CONTRAST: f32 = 0.35;
 /// Log likelihood ratio, net to no net, that twines around must come to, and the most it counts: one twine in a hundred is broken.
 const REGION_LLR: f32 = 3.0;
 const REGION_MOST: f32 = 4.5;
@@ -60,10 +60,11 @@ fn by_itself(edges: [Option<usize>; 2], twines: &[Twine], config: &AdjustConfig)
 
 /// Where twine stands out a fish is known by what it hides, and must not be voted away.
 fn may_be_helped(own: [[Option<usize>; 2]; 2], twines: &[Twine]) -> bool {
-    own.into_iter().flatten().flatten().map(|e| &twines[e]).all(|t| {
-        t.contrast < STRONG_CONTRAST
-            && !matches!(t.state, TwineState::Hidden | TwineState::Fouled | TwineState::Missing)
-    })
+    own.into_iter()
+        .flatten()
+        .flatten()
+        .map(|e| &twines[e])
+        .all(|t| t.contrast < STRONG_CONTRAST && !matches!(t.state, TwineState::Hidden | TwineState::Fouled))
 }
 
 fn by_region(

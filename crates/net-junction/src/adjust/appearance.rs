@@ -1,0 +1,111 @@
+//! How twine looks in each neighbourhood, learned from it: whatever light, blur and colour do.
+
+use crate::adjust::graph::{Graph, upper};
+use crate::adjust::lines::{Means, SHIFT};
+use crate::adjust::profile::Profiles;
+
+/// Energy of a template, in parts of strong ones', below which there is no net: in clean pictures anything stands out from nothing.
+const LEAST_ENERGY: f32 = 0.004;
+/// Part of a template's extreme that it must reach on the line.
+const FLAT_TOP: f32 = 0.8;
+/// Relative amplitudes of what looks like twine.
+const ALIKE: std::ops::Range<f32> = 0.4..2.5;
+
+/// Templates; keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct Appearance {
+    pub means: Means,
+    /// By block, `2 half + 1` values, free of constant and slope.
+    templates: Vec<f32>,
+    /// By block: whether the template is twine on the line.
+    pub centred: Vec<bool>,
+    amplitudes: Vec<f32>,
+    energies: Vec<f32>,
+    pub half: usize,
+}
+
+impl Appearance {
+    /// The template of a block.
+    pub fn template(&self, block: usize) -> &[f32] {
+        let width = 2 * self.half + 1;
+        &self.templates[block * width..][..width]
+    }
+
+    /// Learns templates of `half` steps to each side, whose extreme may lie `beside` steps off the line.
+    pub fn learn(&mut self, graph: &Graph, profiles: &Profiles, half: usize, beside: usize) {
+        self.half = half;
+        self.means.take(profiles, half);
+        self.average(graph, false);
+        // Once more without what looks absent.
+        self.amplitudes.clear();
+        for e in 0..graph.edges.len() {
+            let width = 2 * half + 1;
+            let template = &self.templates[graph.blocks.of_edge(e) * width..][..width];
+            self.amplitudes.push(self.means.best(e, template).1);
+        }
+        self.average(graph, true);
+        self.centre(beside);
+    }
+
+    /// Template of each block: the mean of the profiles around; with `known` only of those that look like twine.
+    fn average(&mut self, graph: &Graph, known: bool) {
+        let width = 2 * self.half + 1;
+        self.templates.clear();
+        self.templates.resize(graph.blocks.count() * width, 0.0);
+        for (block, template) in self.templates.chunks_exact_mut(width).enumerate() {
+            if graph.blocks.members(block).is_empty() {
+                continue;
+            }
+            let mut count = 0.0_f32;
+            for &e in graph.blocks.around(block).into_iter().flatten() {
+                let e = e as usize;
+                if self.means.inside[e] && (!known || ALIKE.contains(&self.amplitudes[e])) {
+                    template.iter_mut().zip(&self.means.row(e)[SHIFT..]).for_each(|(s, m)| *s += m);
+                    count += 1.0;
+                }
+            }
+            template.iter_mut().for_each(|s| *s /= count.max(1.0));
+            remove_line(template);
+        }
+    }
+
+    /// Learned templates fit whatever neighbours have in common, also twine beside the line: what differs most from the template's ends must
+    /// lie on the line.
+    fn centre(&mut self, beside: usize) {
+        let half = self.half;
+        self.centred.clear();
+        let energy = |template: &[f32]| template.iter().map(|t| t * t).sum::<f32>();
+        self.energies.clear();
+        self.energies.extend(self.templates.chunks_exact(2 * half + 1).map(energy).filter(|&e| e > 0.0));
+        let least = LEAST_ENERGY * upper(&mut self.energies).unwrap_or(0.0);
+        for template in self.templates.chunks_exact(2 * half + 1) {
+            // Broad twine reaches far to both sides: beyond it is zero, not at the mean.
+            let end = 0.5 * (template[0] + template[2 * half]);
+            let smooth = |k: usize| 0.25 * (template[k - 1] + 2.0 * template[k] + template[k + 1]) - end;
+            let extreme =
+                (1..2 * half).map(smooth).fold(0.0_f32, |most, t| if t.abs() > most.abs() { t } else { most });
+            let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
+            // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
+            let on_line = near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme);
+            let alike = (template[0] - template[2 * half]).abs() < extreme.abs();
+            self.centred.push(on_line && alike && energy(template) > least);
+        }
+    }
+}
+
+/// Takes constant and slope away.
+pub(crate) fn remove_line(values: &mut [f32]) {
+    let n = values.len() as f32;
+    let middle = 0.5 * (n - 1.0);
+    let mean = values.iter().sum::<f32>() / n;
+    let (mut product, mut squares) = (0.0, 0.0);
+    for (k, v) in values.iter().enumerate() {
+        let d = k as f32 - middle;
+        product += d * v;
+        squares += d * d;
+    }
+    let slope = if squares > 0.0 { product / squares } else { 0.0 };
+    for (k, v) in values.iter_mut().enumerate() {
+        *v -= mean + slope * (k as f32 - middle);
+    }
+}
