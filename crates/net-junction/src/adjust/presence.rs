@@ -108,6 +108,7 @@ impl Presence {
         }
         // Twice: at a net's corner the blocks beside are themselves at its end.
         for _ in 0..2 {
+            self.twine.full.borrow(graph, &mut self.scratch);
             self.twine.whole.borrow(graph, &mut self.scratch);
             self.twine.weakest.borrow(graph, &mut self.scratch);
         }

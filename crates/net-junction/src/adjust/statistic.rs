@@ -59,7 +59,7 @@ pub(crate) fn vote(twine: &Statistic, control: &Statistic, edge: usize, block: u
     let (p0, m0) = (twine.typical[block], control.typical[block]);
     let variance = 0.5 * (twine.spread[block].powi(2) + control.spread[block].powi(2));
     let x = twine.values[edge] - 0.5 * (p0 + m0);
-    (x * (p0 - m0) / variance).clamp(-VOTE_MAX, VOTE_MAX)
+    (x * (p0 - m0).max(0.0) / variance).clamp(-VOTE_MAX, VOTE_MAX)
 }
 
 /// Logarithm of Student's density with five degrees of freedom, up to a constant.
