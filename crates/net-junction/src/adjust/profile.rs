@@ -10,8 +10,9 @@ pub(crate) const COARSE_PX: f64 = 1.0;
 pub(crate) const FINE_PX: f64 = 0.5;
 /// Part of a twine at each end that is left to the knots.
 const END: f32 = 0.03;
-/// Length of a bin along the twine, px, and the most bins of a twine.
-const BIN_PX: f32 = 3.0;
+/// Length of a bin along the twine, px, to find it and to measure it.
+const BIN_PX: (f32, f32) = (5.0, 3.0);
+/// Least and most bins of a twine that is measured.
 const BINS: (f32, f32) = (5.0, 12.0);
 /// Most distance between samples along the twine, px: bilinear samples then touch nearly every pixel.
 const ALONG_PX: f32 = 1.75;
@@ -120,8 +121,8 @@ impl Profiles {
         self.lengths.extend(graph.edges.iter().step_by(stride).map(|e| length(graph, e) as f32));
         let median = median(&mut self.lengths).unwrap_or(1.0);
         self.length_px = median;
-        self.bins =
-            bins.unwrap_or((median / BIN_PX).clamp(if step_px < COARSE_PX { BINS.0 } else { 1.0 }, BINS.1) as usize);
+        let (bin_px, fewest) = if step_px < COARSE_PX { (BIN_PX.1, BINS.0) } else { (BIN_PX.0, 1.0) };
+        self.bins = bins.unwrap_or((median / bin_px).clamp(fewest, BINS.1) as usize);
         self.along.clear();
         let share = (1.0 - 2.0 * END) / self.bins as f32;
         self.along.extend((0..self.bins).map(|b| END + share * (b as f32 + 0.5)));

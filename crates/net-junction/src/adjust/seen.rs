@@ -13,7 +13,7 @@ const REACH: i32 = 2;
 /// Contrast of the neighbourhood from which on twine speaks for itself, and does not need them.
 const STRONG_CONTRAST: f32 = 2.5;
 /// Least mean contrast around: water alone comes to 0.2 with a standard deviation of 0.15.
-const REGION_CONTRAST: f32 = 0.35;
+const REGION_CONTRAST: f32 = 0.4;
 /// Log likelihood ratio, net to no net, that twines around must come to, and the most it counts: one twine in a hundred is broken.
 const REGION_LLR: f32 = 3.0;
 const REGION_MOST: f32 = 4.5;
