@@ -253,9 +253,9 @@ fn holes(missing: impl Iterator<Item = Missing>) -> Vec<Vec<Missing>> {
     holes.into_iter().map(|h| h.1).collect()
 }
 
-/// As the map of a net has it: one twine that is certain, or several together.
+/// By one picture alone: one twine that is certain, in a neighbourhood that stands out, or several together.
 fn is_certain(hole: &[Missing]) -> bool {
     let several = hole.iter().filter(|(_, (llr, _))| *llr < -2.0).count();
-    hole.iter().any(|(_, (llr, contrast))| *llr < -4.0 && *contrast > 4.5)
+    hole.iter().any(|(_, (llr, contrast))| *llr < -5.0 && *contrast > 4.5)
         || hole.iter().map(|(_, (llr, _))| llr).sum::<f32>() < -13.0 && several >= 3
 }

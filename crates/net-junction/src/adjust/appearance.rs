@@ -87,8 +87,7 @@ impl Appearance {
             let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
             // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
             let on_line = near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme);
-            let alike = (template[0] - template[2 * half]).abs() < extreme.abs();
-            self.centred.push(on_line && alike && energy(template) > least);
+            self.centred.push(on_line && energy(template) > least);
         }
     }
 }
