@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::fold::Fold;
 use crate::lockin::{Measurement, Window};
-use crate::numeric::{median, quantile};
+use crate::numeric::median;
 
 /// Tiles of which a mean says nothing.
 const FEW: usize = 8;
@@ -43,8 +43,6 @@ pub struct Evidence {
     pub dissent: f64,
     /// Share of the tiles in which something else than a net hides what could agree or contradict.
     pub hidden: f64,
-    /// Amplitude that a fifth of the tiles stay below, over the median, of the less steady family: 0.57 for noise of a narrow band, more for a net.
-    pub steady: f64,
     /// How far the search's candidate stood above other hypotheses of its depth, standard deviations; zero in a followed picture.
     pub above: f64,
     /// Tiles about the optical axis that counted, of those there are.
@@ -81,16 +79,6 @@ impl Usual {
         let faint = (0..2).all(|f| m.amplitude[f] < FAINT * self.amplitude[f]);
         !m.aligned() && (m.power > LOUD * self.power || faint)
     }
-}
-
-/// See [`Evidence::steady`], of one family.
-fn steadiness(measurements: &[Measurement], f: usize, scratch: &mut Vec<f64>) -> f64 {
-    let mut at = |q: f64| {
-        scratch.clear();
-        scratch.extend(measurements.iter().filter(|m| m.good).map(|m| m.amplitude[f]));
-        quantile(scratch, q)
-    };
-    at(0.2) / at(0.5).max(1e-12)
 }
 
 impl Evidence {
@@ -130,7 +118,6 @@ impl Evidence {
                 }
             }
         }
-        e.steady = f64::min(steadiness(measurements, 0, scratch), steadiness(measurements, 1, scratch));
         if e.tiles > 0 {
             e.v = sum.map(|s| s * f64::sqrt(2.0 / e.tiles as f64));
             e.hidden = hidden as f64 / e.tiles as f64;
@@ -187,11 +174,9 @@ impl Evidence {
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
         let limit = (0.01 + 0.2 * self.balance).min(0.02 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.012);
-        // Meshes too small for a second harmonic: all there is besides the phases that were fitted is that a net is as strong in one place as in another.
-        let steady = if self.tiles2 > FEW { 1.0 } else { logistic((self.steady - 0.68) / 0.03) };
         let straight = logistic((3.5 - bend_deg) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
-        there * twine * alike * steady * straight * normal
+        there * twine * alike * straight * normal
     }
 }
