@@ -4,7 +4,6 @@
 //! `z_h` of one family in one tile, demodulated at h times the predicted phase, peak together where the lattice is off by `e` cells:
 //! `C(e) = sum_h w_h Re(z_h exp(-2 pi j h e))`, the matched filter for a comb in coloured noise.
 
-use crate::likelihood::Polarity;
 use crate::lockin::TileSum;
 use crate::numeric::{median, sin_cos_cycles};
 
@@ -17,33 +16,32 @@ const HIGHEST: f64 = 0.42;
 /// Blur of an ordinary picture, px of the level, one standard deviation.
 const BLUR_PX: f64 = 0.9;
 
-/// Signs of odd and of even harmonics.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Signs([f64; 2]);
+/// Signs of the even harmonics beside the odd ones, by family: 1 where twine looks bright and thin or dark and wide (blurred over more than half a
+/// cell), -1 for dark and thin or bright and wide. Motion blurs one family and not the other.
+pub(crate) type Evens = [f64; 2];
+/// All there are.
+pub(crate) const EVENS: [Evens; 4] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
 
-impl Signs {
-    /// Of a sheet whose lines lie on the twine.
-    pub(crate) fn on_twine(polarity: Polarity) -> Self {
-        Self([f64::from(polarity.sign()); 2])
-    }
-
-    /// Of a sheet as the lock-in has it: where the fundamental is highest, half a cell beside dark twine.
-    pub(crate) fn on_waves(polarity: Polarity) -> Self {
-        Self([1.0, f64::from(polarity.sign())])
-    }
-}
-
-/// Weights of the harmonics for one picture, sheet and polarity.
+/// Weights of the harmonics for one picture and sheet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Comb {
     weight: [[f64; HARMONICS]; 2],
 }
 
 impl Comb {
+    /// `odd`: 1 where the fundamental is highest on the sheet's lines, -1 where it is lowest (dark twine on the lines).
+    ///
     /// For twine of `width` cells along both families, in cells of `cell` px of the level. The power of each harmonic in the middle one of the tiles stands
     /// for that of the noise: where the net is strong it makes all harmonics count alike.
     ///
-    pub(crate) fn new(sums: &[TileSum], width: [f64; 2], cell: f64, signs: Signs, scratch: &mut Vec<f64>) -> Self {
+    pub(crate) fn new(
+        sums: &[TileSum],
+        width: [f64; 2],
+        cell: f64,
+        odd: f64,
+        evens: Evens,
+        scratch: &mut Vec<f64>,
+    ) -> Self {
         let weight = std::array::from_fn(|f| {
             std::array::from_fn(|k| {
                 let h = (k + 1) as f64;
@@ -57,7 +55,7 @@ impl Comb {
                 let bar = std::f64::consts::PI * h * width[f];
                 let blur = std::f64::consts::TAU * h * BLUR_PX / cell;
                 let shape = bar.sin() / bar.max(1e-9) * (-0.5 * blur * blur).exp();
-                shape.max(0.0) / noise * signs.0[k % 2]
+                shape.max(0.0) / noise * [odd, odd * evens[f]][k % 2]
             })
         });
         Self { weight }

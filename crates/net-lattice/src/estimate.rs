@@ -1,6 +1,7 @@
 use net_geometry::nalgebra::{Matrix6, Vector2, Vector3};
 use net_geometry::{Camera, Plane, Pose};
 
+use crate::comb::Evens;
 use crate::decision::Evidence;
 use crate::likelihood::Polarity;
 use crate::model::Model;
@@ -46,6 +47,8 @@ pub struct LatticeEstimate {
     pub polarity: Polarity,
     /// Blur of the picture, px, one standard deviation, as chosen by likelihood among a few.
     pub blur: f64,
+    /// How the twine looks to the lock-in.
+    pub(crate) evens: Evens,
     /// The sheet itself.
     pub(crate) surface: Surface,
     /// Internal families to the net frame's: quarter turns, and the node that is the origin (internal coordinates).
@@ -148,6 +151,7 @@ pub(crate) struct Followed {
     pub pose: Pose,
     pub polarity: Polarity,
     pub blur: f64,
+    pub evens: Evens,
     pub model: Model,
     pub evidence: Evidence,
     pub gain: f64,
@@ -162,6 +166,7 @@ impl LatticeEstimate {
             pose: self.pose,
             polarity: self.polarity,
             blur: self.blur,
+            evens: self.evens,
             model: self.model,
             evidence: self.evidence,
             gain: self.gain,

@@ -3,7 +3,7 @@
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
-use crate::comb::{Comb, Signs};
+use crate::comb::{Comb, EVENS, Evens};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
@@ -92,11 +92,11 @@ impl Tools {
     }
 }
 
-/// Where a lock-in starts, full-resolution px, and for what kind of twine.
+/// Where a lock-in starts, full-resolution px, and how the twine looks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seed {
     pub centre: [f64; 2],
-    pub polarity: Polarity,
+    pub evens: Evens,
 }
 
 /// A locked candidate.
@@ -207,37 +207,38 @@ impl Workspace {
         gain
     }
 
-    /// The last sums read as combs of this polarity.
-    fn comb(&mut self, surface: &Surface, place: (usize, usize), signs: Signs, gain: f32) {
+    /// The last sums read as combs.
+    fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, evens: Evens, gain: f32) {
         let width = self.scope.sides.map(|s| self.twine / s);
         let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
         let t = &mut self.tools;
-        let comb = Comb::new(&t.sums, width, cell, signs, &mut t.scratch);
+        let comb = Comb::new(&t.sums, width, cell, odd, evens, &mut t.scratch);
         measure(surface, &self.view, place, Probe::Comb(comb), gain, &t.sums, &mut t.scratch, &mut t.measurements);
     }
 
     /// What a fitted sheet that lies on the twine has for it: first by all harmonics together, then by the first two, whose measurements are left
     /// behind.
-    pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), polarity: Polarity) -> Evidence {
+    pub(crate) fn weigh(
+        &mut self,
+        surface: &Surface,
+        place: (usize, usize),
+        polarity: Polarity,
+        evens: Evens,
+    ) -> Evidence {
         let gain = self.demodulate(surface, place, &Window::ALL);
-        self.comb(surface, place, Signs::on_twine(polarity), gain);
+        let sign = f64::from(polarity.sign());
+        self.comb(surface, place, sign, evens.map(|e| sign * e), gain);
         let all = self.evidence();
         let t = &mut self.tools;
-        let probe = Probe::Waves(f64::from(polarity.sign()));
+        let probe = Probe::Waves(sign);
         measure(surface, &self.view, place, probe, gain, &t.sums, &mut t.scratch, &mut t.measurements);
         self.evidence().with_comb(&all)
     }
 
     /// One lock-in by all harmonics together.
-    pub(crate) fn measure_comb(
-        &mut self,
-        surface: &Surface,
-        place: (usize, usize),
-        polarity: Polarity,
-        window: &Window,
-    ) {
+    pub(crate) fn measure_comb(&mut self, surface: &Surface, place: (usize, usize), evens: Evens, window: &Window) {
         let gain = self.demodulate(surface, place, window);
-        self.comb(surface, place, Signs::on_waves(polarity), gain);
+        self.comb(surface, place, 1.0, evens, gain);
     }
 
     /// What the last measurements say for the lattice.
@@ -266,9 +267,9 @@ impl Workspace {
         surface.offset = [0.0; 2];
         let place = (self.scale_for(surface.depth).0, 0);
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, polarity: Polarity::Bright }, [0.0; 2]);
-        for polarity in Polarity::BOTH {
-            self.comb(surface, place, Signs::on_waves(polarity), gain);
+        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, evens: EVENS[0] }, [0.0; 2]);
+        for evens in EVENS {
+            self.comb(surface, place, 1.0, evens, gain);
             let measurements = &self.tools.measurements;
             for place in measurements.iter().filter(|m| m.good) {
                 let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
@@ -277,7 +278,7 @@ impl Workspace {
                 // Range and normal are those on the axis: the nearer the better.
                 let score = clear[0].min(clear[1]) * self.window(CENTRAL).weight(place.site.pixel);
                 if score > best.0 {
-                    let seed = Seed { centre: place.site.pixel, polarity };
+                    let seed = Seed { centre: place.site.pixel, evens };
                     best = (score, seed, sum.map(cycles));
                 }
             }
@@ -286,22 +287,22 @@ impl Workspace {
         best.1
     }
 
-    /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns what kind of twine
-    /// that is; `None` if waves of that period are not there at all.
-    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Polarity> {
+    /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns how they
+    /// look; `None` if waves of that period are not there at all.
+    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Evens> {
         surface.offset = [0.0; 2];
         let place = (level, self.tools.tiling);
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let mut best = (THERE, Polarity::Bright, [0.0; 2]);
-        for polarity in Polarity::BOTH {
-            self.comb(surface, place, Signs::on_waves(polarity), gain);
+        let mut best = (THERE, EVENS[0], [0.0; 2]);
+        for evens in EVENS {
+            self.comb(surface, place, 1.0, evens, gain);
             let t = &self.tools;
             let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
             let sum = together(&t.measurements, say);
             let all: f64 = t.measurements.iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
             let clear = sum.map(|z| z[0].hypot(z[1]) / all.max(1e-9));
             if clear[0].min(clear[1]) > best.0 {
-                best = (clear[0].min(clear[1]), polarity, sum.map(cycles));
+                best = (clear[0].min(clear[1]), evens, sum.map(cycles));
             }
         }
         surface.offset = best.2;
@@ -314,7 +315,7 @@ impl Workspace {
         let place = self.scale_for(surface.depth);
         for &(radius, model) in schedule {
             let window = Window { centre: seed.centre, radius: radius * self.view.size };
-            self.measure_comb(&surface, place, seed.polarity, &window);
+            self.measure_comb(&surface, place, seed.evens, &window);
             let t = &mut self.tools;
             t.observations.clear();
             for m in &t.measurements {
