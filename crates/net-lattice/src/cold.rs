@@ -2,7 +2,7 @@
 
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
-use crate::comb::Evens;
+use crate::comb::Looks;
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::LatticeEstimate;
@@ -66,7 +66,7 @@ impl Workspace {
             let mut seeded = start;
             let seed = self.seed(&mut seeded);
             let Some(surface) = self.lock(&seeded, &COLD, seed) else { continue };
-            self.measure_comb(&surface, self.scale_for(surface.depth), seed.evens, &Window::ALL);
+            self.measure_comb(&surface, self.scale_for(surface.depth), seed.looks, &Window::ALL);
             let evidence = self.evidence();
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
@@ -139,9 +139,9 @@ impl Workspace {
             return best;
         }
         let first = best;
-        let mut top = self.agreement(&first.surface, first.seed.evens).0;
+        let mut top = self.agreement(&first.surface, first.seed.looks).0;
         if let Some(surface) = self.counted_out(&first) {
-            let (score, evidence) = self.agreement(&surface, first.seed.evens);
+            let (score, evidence) = self.agreement(&surface, first.seed.looks);
             if score > top {
                 top = score;
                 best = Lock { surface, evidence, ..first };
@@ -160,7 +160,7 @@ impl Workspace {
             if (surface.depth / first.surface.depth).ln().abs() > 0.06 {
                 continue;
             }
-            let (score, evidence) = self.agreement(&surface, seed.evens);
+            let (score, evidence) = self.agreement(&surface, seed.looks);
             if score > top {
                 top = score;
                 best = Lock { surface, seed, evidence, ..first };
@@ -172,7 +172,7 @@ impl Workspace {
     /// The sheet fitted to phases whose whole cycles are counted from tile to tile, and locked again.
     fn counted_out(&mut self, lock: &Lock) -> Option<Surface> {
         let place = self.scale_for(lock.surface.depth);
-        self.measure_comb(&lock.surface, place, lock.seed.evens, &Window::ALL);
+        self.measure_comb(&lock.surface, place, lock.seed.looks, &Window::ALL);
         let t = &mut self.tools;
         t.unwrapper.run(&t.measurements, self.view.levels[place.0].tiles[place.1].nx);
         t.observations.clear();
@@ -189,8 +189,8 @@ impl Workspace {
     }
 
     /// How well the tiles agree with a locked sheet.
-    fn agreement(&mut self, surface: &Surface, evens: Evens) -> (f64, Evidence) {
-        self.measure_comb(surface, self.scale_for(surface.depth), evens, &Window::ALL);
+    fn agreement(&mut self, surface: &Surface, looks: Looks) -> (f64, Evidence) {
+        self.measure_comb(surface, self.scale_for(surface.depth), looks, &Window::ALL);
         let e = self.evidence();
         // Range and normal are claimed on the axis: what agrees there counts twice.
         (e.v[0].min(e.v[1]) * (1.0 + e.good_near), e)
@@ -210,7 +210,7 @@ impl Workspace {
         let (mut second, mut tested) = (0.0, 0);
         // Rivals share the tiles in which this lattice is: what a drawing explains of a fish must not tell between them.
         let tiling = self.view.tiling_for(self.cell_px(lock.surface.depth));
-        self.measure_comb(&lock.surface, (level, tiling), lock.seed.evens, &Window::ALL);
+        self.measure_comb(&lock.surface, (level, tiling), lock.seed.looks, &Window::ALL);
         let t = &mut self.tools;
         t.tiling = tiling;
         t.mask.clear();
@@ -224,13 +224,13 @@ impl Workspace {
             let mut surface = lock.surface;
             if m != 1.0 {
                 surface = lock.surface.scaled(m);
-                let Some(evens) = self.slide(&mut surface, level) else { continue };
-                seed.evens = evens;
+                let Some(looks) = self.slide(&mut surface, level) else { continue };
+                seed.looks = looks;
             }
             let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
             // A lattice of which only every second or third line is there draws most of the picture, too.
             let place = (level, self.view.tiling_for(self.cell_px(surface.depth)));
-            self.measure_comb(&surface, place, seed.evens, &Window::ALL);
+            self.measure_comb(&surface, place, seed.looks, &Window::ALL);
             let all_there = 1.0 - (2.0 * self.fold(&surface, place).unlike).min(1.0);
             let worth = gain * if gain > 0.0 { all_there } else { 1.0 };
             let rival = Lock { surface, start: lock.start.scaled(m), seed, gain, polarity, blur, ..lock };

@@ -16,11 +16,12 @@ const HIGHEST: f64 = 0.42;
 /// Blur of an ordinary picture, px of the level, one standard deviation.
 const BLUR_PX: f64 = 0.9;
 
-/// Signs of the even harmonics beside the odd ones, by family: 1 where twine looks bright and thin or dark and wide (blurred over more than half a
-/// cell), -1 for dark and thin or bright and wide. Motion blurs one family and not the other.
-pub(crate) type Evens = [f64; 2];
-/// All there are.
-pub(crate) const EVENS: [Evens; 4] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+/// How each family looks: the sign of its even harmonics beside the odd ones. 1 where twine is bright and thin or dark and wide (blurred over more than
+/// half a cell), -1 for dark and thin or bright and wide, 0 where only the fundamental is to be relied on: real twine is braided, shaded and fouled.
+/// Motion blurs one family and not the other.
+pub(crate) type Looks = [f64; 2];
+/// All that a family may have.
+pub(crate) const LOOKS: [f64; 3] = [1.0, -1.0, 0.0];
 
 /// Weights of the harmonics for one picture and sheet.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +40,7 @@ impl Comb {
         width: [f64; 2],
         cell: f64,
         odd: f64,
-        evens: Evens,
+        looks: Looks,
         scratch: &mut Vec<f64>,
     ) -> Self {
         let weight = std::array::from_fn(|f| {
@@ -55,7 +56,12 @@ impl Comb {
                 let bar = std::f64::consts::PI * h * width[f];
                 let blur = std::f64::consts::TAU * h * BLUR_PX / cell;
                 let shape = bar.sin() / bar.max(1e-9) * (-0.5 * blur * blur).exp();
-                shape.max(0.0) / noise * [odd, odd * evens[f]][k % 2]
+                shape.max(0.0) / noise
+                    * match k {
+                        0 => odd,
+                        _ if k % 2 == 1 => odd * looks[f],
+                        _ => odd * looks[f].abs(),
+                    }
             })
         });
         Self { weight }

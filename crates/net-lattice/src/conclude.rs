@@ -48,7 +48,7 @@ impl Workspace {
         );
         let errors = covariance::pose(&surface, &labels, &c, count);
         let place = self.scale_for(surface.depth);
-        let evidence = self.weigh(&surface, place, lock.polarity, lock.seed.evens);
+        let evidence = self.weigh(&surface, place, lock.polarity, lock.seed.looks);
         let mean_plane = self.mean_plane(&surface);
         let evidence = evidence.folded(self.fold(&surface, place));
         let evidence = Evidence { above: lock.above, ..evidence };
@@ -72,7 +72,7 @@ impl Workspace {
             margin,
             model,
             polarity: lock.polarity,
-            evens: lock.seed.evens,
+            looks: lock.seed.looks,
             blur: lock.blur,
             surface,
             labels,

@@ -1,7 +1,7 @@
 use net_geometry::nalgebra::{Matrix6, Vector2, Vector3};
 use net_geometry::{Camera, Plane, Pose};
 
-use crate::comb::Evens;
+use crate::comb::Looks;
 use crate::decision::Evidence;
 use crate::likelihood::Polarity;
 use crate::model::Model;
@@ -48,7 +48,7 @@ pub struct LatticeEstimate {
     /// Blur of the picture, px, one standard deviation, as chosen by likelihood among a few.
     pub blur: f64,
     /// How the twine looks to the lock-in.
-    pub(crate) evens: Evens,
+    pub(crate) looks: Looks,
     /// The sheet itself.
     pub(crate) surface: Surface,
     /// Internal families to the net frame's: quarter turns, and the node that is the origin (internal coordinates).
@@ -151,7 +151,7 @@ pub(crate) struct Followed {
     pub pose: Pose,
     pub polarity: Polarity,
     pub blur: f64,
-    pub evens: Evens,
+    pub looks: Looks,
     pub model: Model,
     pub evidence: Evidence,
     pub gain: f64,
@@ -166,7 +166,7 @@ impl LatticeEstimate {
             pose: self.pose,
             polarity: self.polarity,
             blur: self.blur,
-            evens: self.evens,
+            looks: self.looks,
             model: self.model,
             evidence: self.evidence,
             gain: self.gain,

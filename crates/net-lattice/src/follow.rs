@@ -19,7 +19,7 @@ impl Workspace {
         let half = if last.polarity == Polarity::Dark { 0.5 } else { 0.0 };
         let mut surface = start;
         surface.offset = start.offset.map(|o| o - half);
-        let seed = Seed { centre: self.view.centre, evens: last.evens };
+        let seed = Seed { centre: self.view.centre, looks: last.looks };
         let model = last.model.max(Model::Rhomb);
         surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], seed)?;
         surface.offset = surface.offset.map(|o| o + half);

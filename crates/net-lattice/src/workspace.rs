@@ -3,7 +3,7 @@
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
-use crate::comb::{Comb, EVENS, Evens};
+use crate::comb::{Comb, LOOKS, Looks};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
@@ -67,6 +67,8 @@ pub(crate) struct Tools {
     pub map: PhaseMap,
     pub sums: Vec<TileSum>,
     pub measurements: Vec<Measurement>,
+    /// The same by each look.
+    pub looks: [Vec<Measurement>; LOOKS.len()],
     pub observations: Vec<Observation>,
     pub fitter: Fitter,
     pub likelihood: Likelihood,
@@ -96,7 +98,7 @@ impl Tools {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seed {
     pub centre: [f64; 2],
-    pub evens: Evens,
+    pub looks: Looks,
 }
 
 /// A locked candidate.
@@ -208,11 +210,11 @@ impl Workspace {
     }
 
     /// The last sums read as combs.
-    fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, evens: Evens, gain: f32) {
+    fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) {
         let width = self.scope.sides.map(|s| self.twine / s);
         let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
         let t = &mut self.tools;
-        let comb = Comb::new(&t.sums, width, cell, odd, evens, &mut t.scratch);
+        let comb = Comb::new(&t.sums, width, cell, odd, looks, &mut t.scratch);
         measure(surface, &self.view, place, Probe::Comb(comb), gain, &t.sums, &mut t.scratch, &mut t.measurements);
     }
 
@@ -223,11 +225,11 @@ impl Workspace {
         surface: &Surface,
         place: (usize, usize),
         polarity: Polarity,
-        evens: Evens,
+        looks: Looks,
     ) -> Evidence {
         let gain = self.demodulate(surface, place, &Window::ALL);
         let sign = f64::from(polarity.sign());
-        self.comb(surface, place, sign, evens.map(|e| sign * e), gain);
+        self.comb(surface, place, sign, looks.map(|e| sign * e), gain);
         let all = self.evidence();
         let t = &mut self.tools;
         let probe = Probe::Waves(sign);
@@ -236,9 +238,9 @@ impl Workspace {
     }
 
     /// One lock-in by all harmonics together.
-    pub(crate) fn measure_comb(&mut self, surface: &Surface, place: (usize, usize), evens: Evens, window: &Window) {
+    pub(crate) fn measure_comb(&mut self, surface: &Surface, place: (usize, usize), looks: Looks, window: &Window) {
         let gain = self.demodulate(surface, place, window);
-        self.comb(surface, place, 1.0, evens, gain);
+        self.comb(surface, place, 1.0, looks, gain);
     }
 
     /// What the last measurements say for the lattice.
@@ -267,46 +269,59 @@ impl Workspace {
         surface.offset = [0.0; 2];
         let place = (self.scale_for(surface.depth).0, 0);
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, evens: EVENS[0] }, [0.0; 2]);
-        for evens in EVENS {
-            self.comb(surface, place, 1.0, evens, gain);
-            let measurements = &self.tools.measurements;
-            for place in measurements.iter().filter(|m| m.good) {
-                let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
-                let sum = together(measurements, |_, m| window.weight(m.site.pixel));
-                let clear = sum.map(|z| z[0].hypot(z[1]));
-                // Range and normal are those on the axis: the nearer the better.
-                let score = clear[0].min(clear[1]) * self.window(CENTRAL).weight(place.site.pixel);
-                if score > best.0 {
-                    let seed = Seed { centre: place.site.pixel, evens };
-                    best = (score, seed, sum.map(cycles));
-                }
+        self.read_looks(surface, place, gain);
+        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, looks: [0.0; 2] }, [0.0; 2]);
+        for place in self.tools.looks[0].iter().filter(|m| m.good) {
+            let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
+            let clearest = self.clearest(|_, m| window.weight(m.site.pixel));
+            // Range and normal are those on the axis: the nearer the better.
+            let clear = clearest[0].0.min(clearest[1].0);
+            let score = clear * self.window(CENTRAL).weight(place.site.pixel);
+            if score > best.0 {
+                let seed = Seed { centre: place.site.pixel, looks: clearest.map(|c| c.1) };
+                best = (score, seed, clearest.map(|c| c.2));
             }
         }
         surface.offset = best.2;
         best.1
     }
 
+    /// Reads the last sums by all looks.
+    fn read_looks(&mut self, surface: &Surface, place: (usize, usize), gain: f32) {
+        for (k, look) in LOOKS.into_iter().enumerate() {
+            self.comb(surface, place, 1.0, [look; 2], gain);
+            let t = &mut self.tools;
+            std::mem::swap(&mut t.measurements, &mut t.looks[k]);
+        }
+    }
+
+    /// Of each family how clear and in step its clearest look is in the tiles weighted so, that look, and where it has the twine, cycles.
+    fn clearest(&self, weight: impl Fn(usize, &Measurement) -> f64) -> [(f64, f64, f64); 2] {
+        let mut best = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
+        for (look, measurements) in LOOKS.into_iter().zip(&self.tools.looks) {
+            for (best, z) in best.iter_mut().zip(together(measurements, &weight)) {
+                let clear = z[0].hypot(z[1]);
+                if clear > best.0 {
+                    *best = (clear, look, cycles(z));
+                }
+            }
+        }
+        best
+    }
+
     /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns how they
     /// look; `None` if waves of that period are not there at all.
-    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Evens> {
+    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Looks> {
         surface.offset = [0.0; 2];
         let place = (level, self.tools.tiling);
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let mut best = (THERE, EVENS[0], [0.0; 2]);
-        for evens in EVENS {
-            self.comb(surface, place, 1.0, evens, gain);
-            let t = &self.tools;
-            let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
-            let sum = together(&t.measurements, say);
-            let all: f64 = t.measurements.iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
-            let clear = sum.map(|z| z[0].hypot(z[1]) / all.max(1e-9));
-            if clear[0].min(clear[1]) > best.0 {
-                best = (clear[0].min(clear[1]), evens, sum.map(cycles));
-            }
-        }
-        surface.offset = best.2;
-        (best.0 > THERE).then_some(best.1)
+        self.read_looks(surface, place, gain);
+        let t = &self.tools;
+        let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
+        let all: f64 = t.looks[0].iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
+        let clearest = self.clearest(say);
+        surface.offset = clearest.map(|c| c.2);
+        (clearest[0].0.min(clearest[1].0) > THERE * all).then_some(clearest.map(|c| c.1))
     }
 
     /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
@@ -315,7 +330,7 @@ impl Workspace {
         let place = self.scale_for(surface.depth);
         for &(radius, model) in schedule {
             let window = Window { centre: seed.centre, radius: radius * self.view.size };
-            self.measure_comb(&surface, place, seed.evens, &window);
+            self.measure_comb(&surface, place, seed.looks, &window);
             let t = &mut self.tools;
             t.observations.clear();
             for m in &t.measurements {
@@ -423,7 +438,7 @@ impl Workspace {
 }
 
 /// Sum of the unit vectors of both families' phases over the good tiles, each with as much say as its wave is clear; how strong it is says more of fish.
-fn together(measurements: &[Measurement], weight: impl Fn(usize, &Measurement) -> f64) -> [[f64; 2]; 2] {
+fn together(measurements: &[Measurement], weight: &impl Fn(usize, &Measurement) -> f64) -> [[f64; 2]; 2] {
     let mut sum = [[0.0; 2]; 2];
     for (k, m) in measurements.iter().enumerate().filter(|(_, m)| m.good) {
         let w = weight(k, m);
