@@ -169,11 +169,11 @@ impl Evidence {
         let bend_deg = self.bend.to_degrees();
         let (whole, near) = (self.comb_good.min(0.8), self.comb_near.min(0.8));
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
-        let there = logistic(-8.0 + v2 + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
+        let there = logistic(-8.2 + v2 + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
         let twine = logistic((self.separable - 0.82) / 0.02);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
-        let limit = (0.01 + 0.2 * self.balance).min(0.02 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
-        let alike = logistic((limit - self.unlike) / 0.012);
+        let limit = (0.01 + 0.2 * self.balance).min(0.03 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
+        let alike = logistic((limit - self.unlike) / 0.006);
         let straight = logistic((3.5 - bend_deg) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
