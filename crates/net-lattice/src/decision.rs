@@ -172,7 +172,7 @@ impl Evidence {
         let there = logistic(-8.2 + v2 + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
         let twine = logistic((self.separable - 0.82) / 0.02);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
-        let limit = (0.01 + 0.2 * self.balance).min(0.03 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
+        let limit = (0.01 + 0.2 * self.balance).min(0.05 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
         let straight = logistic((3.5 - bend_deg) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
