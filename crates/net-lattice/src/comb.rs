@@ -30,11 +30,10 @@ pub(crate) struct Comb {
 }
 
 impl Comb {
-    /// `odd`: 1 where the fundamental is highest on the sheet's lines, -1 where it is lowest (dark twine on the lines).
-    ///
     /// For twine of `width` cells along both families, in cells of `cell` px of the level. The power of each harmonic in the middle one of the tiles stands
     /// for that of the noise: where the net is strong it makes all harmonics count alike.
     ///
+    /// `odd`: 1 where the fundamental is highest on the sheet's lines, -1 where it is lowest (dark twine on the lines).
     pub(crate) fn new(
         sums: &[TileSum],
         width: [f64; 2],

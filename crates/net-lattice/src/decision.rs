@@ -22,11 +22,11 @@ pub struct Evidence {
     /// The same among the tiles about the optical axis that are not empty (at least four tenths of them), where range and normal are
     /// claimed; zero without such tiles.
     pub good_near: f64,
-    /// Coherence of where all harmonics together have the twines, as `v`; shares of agreeing tiles by that, as `good` and `good_near`.
+    /// Coherence per family of where four harmonics together have the twines, as `v`: about N(0, 1) without a net.
     pub comb: [f64; 2],
-    /// See `comb`.
+    /// Share of tiles whose twines are within 1 rad of the fundamental from the lattice by four harmonics together, of those that are not hidden.
     pub comb_good: f64,
-    /// See `comb`.
+    /// The same among the tiles about the optical axis that are not empty, as `good_near`.
     pub comb_near: f64,
     /// Angle, rad, between the tangent plane on the axis and the mean plane about it. Where a sheet bends by more than the tolerance
     /// inside the view, "the" normal means little.
@@ -162,7 +162,7 @@ impl Evidence {
     /// `tilt_sigma` (rad) true but for a factor.
     ///
     /// The weights are a logistic regression with weights of one sign on 313 scenes of the simulator's studies (`net_sim::Study`), wrong claims counted
-    /// fourfold, and then made stricter until none of these was wrong by more than two degrees; see the examples `study` and `score` for what they lead to.
+    /// fourfold, and then made stricter by hand until none of these was claimed wrongly; see the examples `study` and `score` for what they lead to.
     pub fn probability(&self, tilt_sigma: f64) -> f64 {
         let v2 = self.v2[0].abs().min(self.v2[1].abs()).min(5.0);
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());

@@ -6,7 +6,8 @@ use crate::config::Config;
 use crate::estimate::LatticeEstimate;
 use crate::likelihood::Polarity;
 use crate::model::Model;
-use crate::workspace::{Lock, Seed, Workspace};
+use crate::seed::Seed;
+use crate::workspace::{Lock, Workspace};
 
 impl Workspace {
     /// The sheet of the last picture, moved as predicted, locked and refined.

@@ -198,7 +198,8 @@ impl Likelihood {
         }
     }
 
-    /// Robust log-likelihood gain of the drawing over an empty picture (Cauchy noise), natural units.
+    /// Robust log-likelihood gain of the drawing over an empty picture (Cauchy noise), natural units, in the tiles of `grid` that the mask has; an empty mask
+    /// has all.
     pub(crate) fn gain(
         &mut self,
         map: &PhaseMap,

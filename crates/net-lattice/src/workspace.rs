@@ -3,6 +3,7 @@
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
+use crate::background::Background;
 use crate::comb::{Comb, LOOKS, Looks};
 use crate::config::Config;
 use crate::decision::Evidence;
@@ -14,7 +15,8 @@ use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
 use crate::model::Model;
 use crate::numeric::clip_level;
-use crate::search::{Background, Candidate, Scope, Search};
+use crate::search::{Candidate, Scope, Search};
+use crate::seed::Seed;
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
 use crate::stages::Stages;
@@ -24,18 +26,10 @@ use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
 const WEAK: f64 = 0.05;
-/// Standard deviation of the window in which a lock-in starts, px of an 848 x 480 px picture.
-const SEED: f64 = 110.0;
-/// The same of how much less a place counts for starting the farther off the axis it is.
-const CENTRAL: f64 = 500.0;
 /// What counts as near the optical axis, px of an 848 x 480 px picture.
 const NEAR: f64 = 220.0;
 /// Power of a wave over that of noise from which more adds no weight: knots are not where a perfect lattice has them.
 pub(crate) const LOUDEST: f64 = 60.0;
-/// Power of a wave over that of noise from which it is clear.
-const LOUD: f64 = 12.0;
-/// How clear and in step waves of a rival period are at least, of what clear waves in perfect step are.
-const THERE: f64 = 0.08;
 /// Smallest cell, full-resolution px on the axis, that is looked for.
 pub(crate) const SMALLEST_CELL: f64 = 3.7;
 
@@ -92,13 +86,6 @@ impl Tools {
         self.high = [0.0; 4];
         self.thin = [(0.0, 0.0); 4];
     }
-}
-
-/// Where a lock-in starts, full-resolution px, and how the twine looks.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Seed {
-    pub centre: [f64; 2],
-    pub looks: Looks,
 }
 
 /// A locked candidate.
@@ -200,7 +187,7 @@ impl Workspace {
     }
 
     /// The sums of a lock-in at the predicted sheet; returns the gain they were taken with.
-    fn demodulate(&mut self, surface: &Surface, place: (usize, usize), window: &Window) -> f32 {
+    pub(crate) fn demodulate(&mut self, surface: &Surface, place: (usize, usize), window: &Window) -> f32 {
         let gain = self.thin(place.0, self.cell_px(surface.depth));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
@@ -210,7 +197,7 @@ impl Workspace {
     }
 
     /// The last sums read as combs.
-    fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) {
+    pub(crate) fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) {
         let width = self.scope.sides.map(|s| self.twine / s);
         let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
         let t = &mut self.tools;
@@ -261,67 +248,6 @@ impl Workspace {
     /// A window about the optical axis, radius in px of an 848 x 480 px picture.
     pub(crate) fn window(&self, radius: f64) -> Window {
         Window { centre: self.view.centre, radius: radius * self.view.size }
-    }
-
-    /// Where in the picture the waves of a predicted sheet are seen best: there a lock-in starts. The sheet is moved to fit there. A fish on
-    /// the optical axis hides no net beside it.
-    pub(crate) fn seed(&mut self, surface: &mut Surface) -> Seed {
-        surface.offset = [0.0; 2];
-        let place = (self.scale_for(surface.depth).0, 0);
-        let gain = self.demodulate(surface, place, &Window::ALL);
-        self.read_looks(surface, place, gain);
-        let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, looks: [0.0; 2] }, [0.0; 2]);
-        for place in self.tools.looks[0].iter().filter(|m| m.good) {
-            let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
-            let clearest = self.clearest(|_, m| window.weight(m.site.pixel));
-            // Range and normal are those on the axis: the nearer the better.
-            let clear = clearest[0].0.min(clearest[1].0);
-            let score = clear * self.window(CENTRAL).weight(place.site.pixel);
-            if score > best.0 {
-                let seed = Seed { centre: place.site.pixel, looks: clearest.map(|c| c.1) };
-                best = (score, seed, clearest.map(|c| c.2));
-            }
-        }
-        surface.offset = best.2;
-        best.1
-    }
-
-    /// Reads the last sums by all looks.
-    fn read_looks(&mut self, surface: &Surface, place: (usize, usize), gain: f32) {
-        for (k, look) in LOOKS.into_iter().enumerate() {
-            self.comb(surface, place, 1.0, [look; 2], gain);
-            let t = &mut self.tools;
-            std::mem::swap(&mut t.measurements, &mut t.looks[k]);
-        }
-    }
-
-    /// Of each family how clear and in step its clearest look is in the tiles weighted so, that look, and where it has the twine, cycles.
-    fn clearest(&self, weight: impl Fn(usize, &Measurement) -> f64) -> [(f64, f64, f64); 2] {
-        let mut best = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
-        for (look, measurements) in LOOKS.into_iter().zip(&self.tools.looks) {
-            for (best, z) in best.iter_mut().zip(together(measurements, &weight)) {
-                let clear = z[0].hypot(z[1]);
-                if clear > best.0 {
-                    *best = (clear, look, cycles(z));
-                }
-            }
-        }
-        best
-    }
-
-    /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns how they
-    /// look; `None` if waves of that period are not there at all.
-    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Looks> {
-        surface.offset = [0.0; 2];
-        let place = (level, self.tools.tiling);
-        let gain = self.demodulate(surface, place, &Window::ALL);
-        self.read_looks(surface, place, gain);
-        let t = &self.tools;
-        let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
-        let all: f64 = t.looks[0].iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
-        let clearest = self.clearest(say);
-        surface.offset = clearest.map(|c| c.2);
-        (clearest[0].0.min(clearest[1].0) > THERE * all).then_some(clearest.map(|c| c.1))
     }
 
     /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
@@ -435,23 +361,4 @@ impl Workspace {
         }
         fit
     }
-}
-
-/// Sum of the unit vectors of both families' phases over the good tiles, each with as much say as its wave is clear; how strong it is says more of fish.
-fn together(measurements: &[Measurement], weight: &impl Fn(usize, &Measurement) -> f64) -> [[f64; 2]; 2] {
-    let mut sum = [[0.0; 2]; 2];
-    for (k, m) in measurements.iter().enumerate().filter(|(_, m)| m.good) {
-        let w = weight(k, m);
-        for f in 0..2 {
-            let say = w * m.snr[f].min(LOUD).sqrt();
-            sum[f][0] += say * m.phase[f].cos();
-            sum[f][1] += say * m.phase[f].sin();
-        }
-    }
-    sum
-}
-
-/// Direction of such a sum, cycles.
-fn cycles(z: [f64; 2]) -> f64 {
-    z[1].atan2(z[0]) / std::f64::consts::TAU
 }
