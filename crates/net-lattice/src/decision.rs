@@ -15,7 +15,7 @@ pub struct Evidence {
     /// Coherence of the fundamental per family: sqrt(2/N) times the sum of the cosines of the residual phases. Without a net about N(0, 1), a
     /// little more after a flexible fit.
     pub v: [f64; 2],
-    /// The same of the second harmonic, which is never fitted; the fundamental's where no tile resolves it.
+    /// The same of the second harmonic, which is never fitted; zero where hardly a tile resolves it.
     pub v2: [f64; 2],
     /// Share of tiles with both residual phases below 1 rad, of those that are not hidden.
     pub good: f64,
@@ -43,6 +43,8 @@ pub struct Evidence {
     pub dissent: f64,
     /// Share of the tiles in which something else than a net hides what could agree or contradict.
     pub hidden: f64,
+    /// Whether the sheet was fitted flat.
+    pub flat: bool,
     /// How far the search's candidate stood above other hypotheses of its depth, standard deviations; zero in a followed picture.
     pub above: f64,
     /// Tiles about the optical axis that counted, of those there are.
@@ -124,7 +126,9 @@ impl Evidence {
             e.good = aligned as f64 / (e.tiles - hidden).max(1) as f64;
         }
         e.dissent = against as f64 / strong.max(1) as f64;
-        e.v2 = if e.tiles2 > FEW { sum2.map(|s| s * f64::sqrt(2.0 / e.tiles2 as f64)) } else { e.v };
+        if e.tiles2 > FEW {
+            e.v2 = sum2.map(|s| s * f64::sqrt(2.0 / e.tiles2 as f64));
+        }
         // Where the net ends in view there may be few tiles about the axis, but not next to none.
         let all = e.near[1].max(1) as f64;
         e.good_near = aligned_near as f64 / (all - silent_near as f64).max(0.4 * all);
@@ -164,12 +168,18 @@ impl Evidence {
     /// The weights are a logistic regression with weights of one sign on 313 scenes of the simulator's studies (`net_sim::Study`), wrong claims counted
     /// fourfold, and then made stricter by hand until none of these was claimed wrongly; see the examples `study` and `score` for what they lead to.
     pub fn probability(&self, tilt_sigma: f64) -> f64 {
-        let v2 = self.v2[0].abs().min(self.v2[1].abs()).min(5.0);
+        // Meshes too small for a second harmonic: only a flat fit's six or seven parameters cannot have brought the fundamental's phases into step.
+        let witness = match (self.tiles2 > FEW, self.flat) {
+            (true, _) => self.v2,
+            (false, true) => self.v,
+            (false, false) => [0.0; 2],
+        };
+        let second = witness[0].abs().min(witness[1].abs()).min(5.0);
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let bend_deg = self.bend.to_degrees();
         let (whole, near) = (self.comb_good.min(0.8), self.comb_near.min(0.8));
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
-        let there = logistic(-8.2 + v2 + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
+        let there = logistic(-8.2 + second + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
         let twine = logistic((self.separable - 0.82) / 0.02);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
         let limit = (0.01 + 0.2 * self.balance).min(0.05 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
@@ -178,5 +188,35 @@ impl Evidence {
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
         there * twine * alike * straight * normal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    #[test]
+    fn a_bent_fit_needs_a_second_harmonic() {
+        let ask = Config::default().probability_threshold;
+        // Every tile agrees, nothing contradicts, the average cell is two crossing twines.
+        let perfect = Evidence {
+            v: [16.0; 2],
+            v2: [16.0; 2],
+            comb_good: 1.0,
+            comb_near: 1.0,
+            separable: 1.0,
+            balance: 1.0,
+            cell_snr: 1000.0,
+            tiles: 144,
+            tiles2: 144,
+            ..Evidence::default()
+        };
+        let of = |e: Evidence| e.probability(0.001);
+        assert!(of(perfect) > ask && of(Evidence { flat: true, ..perfect }) > ask);
+        // Meshes too small for one: a flat fit stands, for it is too stiff to follow noise of a narrow band; a bent one does not.
+        let small = Evidence { v2: [0.0; 2], tiles2: 0, ..perfect };
+        assert!(of(Evidence { flat: true, ..small }) > ask);
+        assert!(of(small) < ask);
     }
 }
