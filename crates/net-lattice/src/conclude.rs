@@ -51,7 +51,7 @@ impl Workspace {
         let evidence = self.weigh(&surface, place, lock.polarity, lock.seed.looks);
         let mean_plane = self.mean_plane(&surface);
         let evidence = evidence.folded(self.fold(&surface, place));
-        let evidence = Evidence { above: lock.above, flat: model <= Model::Rhomb, ..evidence };
+        let evidence = Evidence { above: lock.above, ..evidence };
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {

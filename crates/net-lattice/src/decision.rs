@@ -43,8 +43,6 @@ pub struct Evidence {
     pub dissent: f64,
     /// Share of the tiles in which something else than a net hides what could agree or contradict.
     pub hidden: f64,
-    /// Whether the sheet was fitted flat.
-    pub flat: bool,
     /// How far the search's candidate stood above other hypotheses of its depth, standard deviations; zero in a followed picture.
     pub above: f64,
     /// Tiles about the optical axis that counted, of those there are.
@@ -168,13 +166,10 @@ impl Evidence {
     /// The weights are a logistic regression with weights of one sign on 313 scenes of the simulator's studies (`net_sim::Study`), wrong claims counted
     /// fourfold, and then made stricter by hand until none of these was claimed wrongly; see the examples `study` and `score` for what they lead to.
     pub fn probability(&self, tilt_sigma: f64) -> f64 {
-        // Meshes too small for a second harmonic: only a flat fit's six or seven parameters cannot have brought the fundamental's phases into step.
-        let witness = match (self.tiles2 > FEW, self.flat) {
-            (true, _) => self.v2,
-            (false, true) => self.v,
-            (false, false) => [0.0; 2],
-        };
-        let second = witness[0].abs().min(witness[1].abs()).min(5.0);
+        // Nothing but the second harmonic was not fitted: without one nothing is vouched for. Motion blur turns its sign in one family; in both it is turned
+        // where the pattern is no twine (scales).
+        let [a, b] = self.v2;
+        let second = if a < 0.0 && b < 0.0 { 0.0 } else { a.abs().min(b.abs()).min(5.0) };
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let bend_deg = self.bend.to_degrees();
         let (whole, near) = (self.comb_good.min(0.8), self.comb_near.min(0.8));
@@ -197,7 +192,7 @@ mod tests {
     use crate::config::Config;
 
     #[test]
-    fn a_bent_fit_needs_a_second_harmonic() {
+    fn nothing_is_vouched_for_without_a_second_harmonic_of_twine() {
         let ask = Config::default().probability_threshold;
         // Every tile agrees, nothing contradicts, the average cell is two crossing twines.
         let perfect = Evidence {
@@ -212,11 +207,11 @@ mod tests {
             tiles2: 144,
             ..Evidence::default()
         };
-        let of = |e: Evidence| e.probability(0.001);
-        assert!(of(perfect) > ask && of(Evidence { flat: true, ..perfect }) > ask);
-        // Meshes too small for one: a flat fit stands, for it is too stiff to follow noise of a narrow band; a bent one does not.
-        let small = Evidence { v2: [0.0; 2], tiles2: 0, ..perfect };
-        assert!(of(Evidence { flat: true, ..small }) > ask);
-        assert!(of(small) < ask);
+        let with = |v2: [f64; 2]| Evidence { v2, ..perfect }.probability(0.001);
+        assert!(with([16.0, 16.0]) > ask);
+        assert!(with([-16.0, 16.0]) > ask, "one family blurred");
+        assert!(with([0.0, 0.0]) < ask, "meshes too small for one");
+        assert!(with([0.5, 16.0]) < ask, "one family has none");
+        assert!(with([-16.0, -16.0]) < ask, "turned in both");
     }
 }
