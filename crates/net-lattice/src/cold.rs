@@ -13,7 +13,7 @@ use crate::model::{self, Model};
 use crate::search;
 use crate::stages::Stages;
 use crate::surface::Surface;
-use crate::workspace::{LOUDEST, Lock, SMALLEST_CELL, Workspace};
+use crate::workspace::{LOUDEST, Lock, Workspace};
 
 /// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
 const COLD: [(f64, Model); 7] = [
@@ -25,23 +25,18 @@ const COLD: [(f64, Model); 7] = [
     (2000.0, Model::Quartic),
     (2000.0, Model::Quartic),
 ];
-/// Rival depths: scaling depth by m scales every phase by m.
-const RIVALS: [f64; 12] = [1.0 / 7.0, 1.0 / 6.0, 0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 
 /// Tilt from which a lock-in is tried again, rad.
-/// Agreeing tiles without which all of the picture tells between rival periods.
-const FEWEST: usize = 4;
 /// Coherence of both families that leaves no doubt. Forty tiles in perfect step have 8.9.
 const SURE: f64 = 5.5;
 /// Share of a candidate's score below which another is nothing beside it.
 const PART: f64 = 0.45;
+/// Candidates of a bank of tiles that are refined to the end.
+const REFINED: usize = 16;
 /// Candidates that are looked through for a second net.
 const MOST: usize = 12;
-/// How often the period may change.
-const PERIODS: usize = 3;
-
 const OTHER: f64 = 0.16;
 
 impl Workspace {
@@ -79,16 +74,8 @@ impl Workspace {
         }
         let lock = Self::best_lock(&locks);
         self.locks = locks;
-        let mut lock = self.elsewhere(lock?);
-        // A rival may have rivals of its own: from the third harmonic of a net half as far as it, say.
-        let mut margin = 1.0;
-        for _ in 0..PERIODS {
-            let m;
-            (lock, m, margin) = self.true_cell(lock)?;
-            if m == 1.0 {
-                break;
-            }
-        }
+        let lock = self.elsewhere(lock?);
+        let (mut lock, margin) = self.true_period(lock)?;
         self.seat(&mut lock);
         self.stages = Some(Stages::new(&lock.start, &lock.surface));
         self.finish(config, lock, margin)
@@ -102,11 +89,17 @@ impl Workspace {
             found.clear();
             search.run(bank, &self.scope, 3, found);
             let scale = self.view.levels[bank.level].scale;
-            found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c));
+            found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c, search::ROUGHLY));
             let range = search.depths_m(self.scope.sides[0]);
             search::add_rivals(bank, scale, &self.scope, range, found);
             self.background.measure(search, bank, scale, &self.scope);
             for c in found.iter_mut() {
+                c.above = self.background.above(c);
+            }
+            search::distinct(found);
+            search::interleave(found);
+            for c in found.iter_mut().take(REFINED) {
+                *c = search::refine(bank, scale, &self.scope, c, search::FINELY);
                 c.above = self.background.above(c);
             }
             refined.append(found);
@@ -169,6 +162,11 @@ impl Workspace {
         best
     }
 
+    /// Locks again to a sheet that is right but for a few cells at the rim.
+    pub(crate) fn lock_whole(&mut self, lock: &Lock) -> Option<Surface> {
+        self.lock(&lock.surface, &COLD[2..], lock.seed)
+    }
+
     /// The sheet fitted to phases whose whole cycles are counted from tile to tile, and locked again.
     fn counted_out(&mut self, lock: &Lock) -> Option<Surface> {
         let place = self.scale_for(lock.surface.depth);
@@ -196,63 +194,6 @@ impl Workspace {
         (e.v[0].min(e.v[1]) * (1.0 + e.good_near), e)
     }
 
-    /// Tests the rival periods; returns the best, and the share of its gain by which the second falls short.
-    fn true_cell(&mut self, lock: Lock) -> Option<(Lock, f64, f64)> {
-        let cell = self.short_px(lock.surface.depth);
-        let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
-        let smallest = SMALLEST_CELL * 0.9 * self.view.reduction as f64;
-        let possible = |m: &f64| *m == 1.0 || (cell / m > smallest && cell / m < span);
-        let (first, last) = (RIVALS.into_iter().find(possible)?, RIVALS.into_iter().rev().find(possible)?);
-        let widest = self.cell_px(lock.surface.depth * first);
-        let level = self.view.level_for(cell / last, 6.0);
-        // The best and the second of them by gain, with the rival's period.
-        let mut best: Option<(f64, f64, Lock)> = None;
-        let (mut second, mut tested) = (0.0, 0);
-        // Rivals share the tiles in which this lattice is: what a drawing explains of a fish must not tell between them.
-        let tiling = self.view.tiling_for(self.cell_px(lock.surface.depth));
-        self.measure_comb(&lock.surface, (level, tiling), lock.seed.looks, &Window::ALL);
-        let t = &mut self.tools;
-        t.tiling = tiling;
-        t.mask.clear();
-        t.mask.extend(t.measurements.iter().map(|m| m.aligned()));
-        if t.mask.iter().filter(|m| **m).count() < FEWEST {
-            t.mask.clear();
-        }
-        let (_, _, blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &[0.76, 1.5, 2.8]);
-        for m in RIVALS.into_iter().filter(possible) {
-            let mut seed = lock.seed;
-            let mut surface = lock.surface;
-            if m != 1.0 {
-                surface = lock.surface.scaled(m);
-                let Some(looks) = self.slide(&mut surface, level) else { continue };
-                seed.looks = looks;
-            }
-            let (gain, polarity, blur) = self.gain(&surface, level, widest, &Polarity::BOTH, &[blur]);
-            // A lattice of which only every second or third line is there draws most of the picture, too.
-            let place = (level, self.view.tiling_for(self.cell_px(surface.depth)));
-            self.measure_comb(&surface, place, seed.looks, &Window::ALL);
-            let all_there = 1.0 - (2.0 * self.fold(&surface, place).unlike).min(1.0);
-            let worth = gain * if gain > 0.0 { all_there } else { 1.0 };
-            let rival = Lock { surface, start: lock.start.scaled(m), seed, gain, polarity, blur, ..lock };
-            match &best {
-                Some((top, ..)) if worth <= *top => second = if tested == 1 { worth } else { f64::max(second, worth) },
-                before => {
-                    second = before.as_ref().map_or(0.0, |b| b.0);
-                    best = Some((worth, m, rival));
-                }
-            }
-            tested += 1;
-        }
-        let (gain, m, mut best) = best?;
-        if m != 1.0
-            && let Some(s) = self.lock(&best.surface, &COLD[2..], best.seed)
-        {
-            best.surface = s;
-        }
-        self.tools.mask.clear();
-        Some((best, m, (gain - second) / gain.abs().max(1e-9)))
-    }
-
     /// From where the lock-in has bright twine to where twine is. One family can sit half a cell off when the other decided the polarity: the
     /// drawing tells.
     fn seat(&mut self, best: &mut Lock) {
@@ -264,8 +205,7 @@ impl Workspace {
         self.high(level, widest);
         let mut drawing = self.drawing(level, widest, best.polarity, best.blur);
         drawing.sparse = true;
-        self.tools.likelihood.load(&self.view.levels[level]);
-        self.tools.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
+        self.load_likelihood(level);
         let mut top = (f64::NEG_INFINITY, best.surface);
         for shift in [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]] {
             let mut surface = best.surface;
@@ -286,7 +226,9 @@ impl Workspace {
     fn finish(&mut self, config: &Config, lock: Lock, margin: f64) -> Option<LatticeEstimate> {
         let mut surface = lock.surface;
         let mut model = Model::Bent;
-        if let Some((fit, _)) = self.likelihood(&surface, &lock, model, 3) {
+        if let Some((fit, _)) = self.likelihood(&surface, &lock, model, 2, true)
+            && let Some((fit, _)) = self.likelihood(&fit.surface, &lock, model, 1, false)
+        {
             surface = fit.surface;
             let t = &mut self.tools;
             if let Some(choice) =
@@ -296,7 +238,7 @@ impl Workspace {
                 model = choice.model;
             }
         }
-        self.conclude(config, &surface, &lock, model, 2, margin, None)
+        self.conclude(config, &surface, &lock, model, margin, None)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The end of every picture: last passes on the drawing, evidence, covariance, and the result in the net frame.
+//! The end of every picture: the last pass on the drawing, evidence, covariance, and the result in the net frame.
 
 use net_geometry::Plane;
 use net_geometry::nalgebra::{Matrix3, Vector3};
@@ -15,18 +15,17 @@ use crate::workspace::{Lock, Workspace};
 const REACH: f64 = 160.0;
 
 impl Workspace {
-    /// Last passes on the drawing with the chosen model, evidence, covariance, and the result in the net frame.
+    /// The last pass on the drawing with the chosen model, evidence, covariance, and the result in the net frame.
     pub(crate) fn conclude(
         &mut self,
         config: &Config,
         surface: &Surface,
         lock: &Lock,
         model: Model,
-        passes: usize,
         margin: f64,
         labels: Option<Labels>,
     ) -> Option<LatticeEstimate> {
-        let (fit, robust) = self.likelihood(surface, lock, model, passes)?;
+        let (fit, robust) = self.likelihood(surface, lock, model, 1, false)?;
         let surface = fit.surface;
         let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
         let count = model.parameters();

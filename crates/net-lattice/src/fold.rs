@@ -61,7 +61,10 @@ impl Folder {
         self.sums.clear();
         self.sums.resize(2 * WIDE * WIDE, [0.0; 2]);
         let (bx, by) = level.blocks();
-        let bin = |s: f32| (((wrap(s / CELLS as f32) + 0.5) * WIDE as f32) as usize).min(WIDE - 1);
+        const PER_CELL: f32 = (WIDE / CELLS) as f32;
+        // Shifted by a whole fold above zero, where truncation is the floor.
+        let bin = |s: f32| (s * PER_CELL + (2 * WIDE) as f32) as u32 as usize % WIDE;
+        let near = |s: f32| wrap(s / CELLS as f32) * CELLS as f32;
         let mut total = [[0.0; 2]; 2];
         for y in 0..by {
             let tiles = &measurements[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
@@ -70,6 +73,7 @@ impl Folder {
                     continue;
                 }
                 let Some([p, q]) = map.block(x, y) else { continue };
+                let (p0, q0) = (near(p.s), near(q.s));
                 let half = coin(x, y);
                 let sums = &mut self.sums[half * WIDE * WIDE..][..WIDE * WIDE];
                 for r in 0..BLOCK {
@@ -77,7 +81,7 @@ impl Folder {
                     let v = r as f32 - 1.5;
                     for (c, i) in row.iter().enumerate() {
                         let u = c as f32 - 1.5;
-                        let k = bin(p.s + p.du * u + p.dv * v) * WIDE + bin(q.s + q.du * u + q.dv * v);
+                        let k = bin(p0 + p.du * u + p.dv * v) * WIDE + bin(q0 + q.du * u + q.dv * v);
                         let value = f64::from((i * gain).clamp(-1.0, 1.0));
                         sums[k][0] += value;
                         sums[k][1] += 1.0;

@@ -35,6 +35,6 @@ impl Workspace {
             polarity: last.polarity,
             blur: last.blur,
         };
-        self.conclude(config, &surface, &lock, last.model, 1, last.margin, Some(last.labels))
+        self.conclude(config, &surface, &lock, last.model, last.margin, Some(last.labels))
     }
 }

@@ -64,6 +64,7 @@ mod naming;
 mod nodes;
 mod numeric;
 mod paint;
+mod periods;
 mod search;
 mod seed;
 mod smooth;

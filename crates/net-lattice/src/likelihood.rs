@@ -11,6 +11,32 @@ use crate::surface::Surface;
 use crate::template::{Profile, look_up};
 use crate::view::{BLOCK, Level, TileGrid};
 
+/// Gives blocks that a sparse comparison leaves out the mean of those beside them.
+fn fill_in(blocks: &mut Image<f32>) {
+    let (bx, by) = (blocks.width(), blocks.height());
+    for y in (0..by).step_by(2) {
+        let row = blocks.row_mut(y);
+        for x in (0..bx).filter(|x| !chosen(*x, y)) {
+            let left = x.checked_sub(1).unwrap_or(x + 1).min(bx - 1);
+            let right = if x + 1 < bx { x + 1 } else { x.saturating_sub(1) };
+            row[x] = 0.5 * (row[left] + row[right]);
+        }
+    }
+    for y in (1..by).step_by(2) {
+        let (above, rest) = blocks.data_mut()[(y - 1) * bx..].split_at_mut(bx);
+        let (row, below) = rest.split_at_mut(bx);
+        let below = below.get(..bx).unwrap_or(above);
+        for ((m, a), b) in row.iter_mut().zip(above.iter()).zip(below) {
+            *m = 0.5 * (a + b);
+        }
+    }
+}
+
+/// The one block in four of a sparse comparison: every second of every second row, each such row a block aside of the last.
+fn chosen(x: usize, y: usize) -> bool {
+    y.is_multiple_of(2) && (x + y / 2).is_multiple_of(2)
+}
+
 const PIXELS: usize = BLOCK * BLOCK;
 type Block = [f32; PIXELS];
 
@@ -46,7 +72,7 @@ pub(crate) struct Drawing {
     pub contrast_length: f64,
     /// Length of the high-pass filter, px of the level.
     pub high_pass: f64,
-    /// Compare every second block only.
+    /// Compare one block in four only.
     pub sparse: bool,
 }
 
@@ -120,7 +146,7 @@ impl Likelihood {
                 let mean = &mut self.mean.data_mut()[b];
                 *mean = 0.0;
                 let Some(planes) = map.block(x, y) else { continue };
-                self.used[b] = !(drawing.sparse && (x + y) % 2 == 1);
+                self.used[b] = !drawing.sparse || chosen(x, y);
                 if !self.used[b] {
                     continue;
                 }
@@ -149,23 +175,7 @@ impl Likelihood {
             }
         }
         if drawing.sparse {
-            // Unused neighbours take the mean of the used ones beside them.
-            for y in 0..self.blocks_y {
-                for x in 0..bx {
-                    if (x + y) % 2 == 1 {
-                        let row = &self.mean.data()[y * bx..][..bx];
-                        let (a, b) = (row[x - usize::from(x > 0)], row[(x + 1).min(bx - 1)]);
-                        let value = if x > 0 && x + 1 < bx {
-                            0.5 * (a + b)
-                        } else if x > 0 {
-                            a
-                        } else {
-                            b
-                        };
-                        self.mean.data_mut()[y * bx + x] = value;
-                    }
-                }
-            }
+            fill_in(&mut self.mean);
         }
         smoother.blur(&self.mean, (drawing.high_pass / BLOCK as f64) as f32, &mut self.smooth);
         for (b, used) in self.used.iter().enumerate() {
@@ -233,7 +243,7 @@ impl Likelihood {
             }
             gain += f64::from(sum);
         }
-        gain * std::f64::consts::LN_2 * if drawing.sparse { 2.0 } else { 1.0 }
+        gain * std::f64::consts::LN_2 * if drawing.sparse { 4.0 } else { 1.0 }
     }
 
     /// Where each tile says the lattice is: its predicted coordinates plus the shift that the picture asks for.
@@ -251,11 +261,16 @@ impl Likelihood {
         self.cap_amplitude();
         let clip = (4.0 * self.noise).powi(2);
         for b in 0..self.used.len() {
-            let a = self.amplitude.data()[b];
+            if drawing.sparse && !chosen(b % self.blocks_x, b / self.blocks_x) {
+                continue;
+            }
             // Without a drawing the picture itself is the residual.
-            let a = if self.used[b] { a } else { 0.0 };
+            let a = if self.used[b] { self.amplitude.data()[b] } else { 0.0 };
             let sum: f32 = self.image[b].iter().zip(&self.drawn[b]).map(|(i, t)| (i - a * t).powi(2).min(clip)).sum();
             self.num.data_mut()[b] = sum / PIXELS as f32;
+        }
+        if drawing.sparse {
+            fill_in(&mut self.num);
         }
         smoother.blur(&self.num, (drawing.contrast_length / BLOCK as f64) as f32, &mut self.variance);
         self.tiles.clear();

@@ -10,6 +10,8 @@ pub(crate) struct PhaseMap {
     pub s: Vec<[f32; 2]>,
     pub nodes_x: usize,
     coarse: Vec<[f64; 2]>,
+    /// A row of all nodes interpolated from a row of exact ones, for four rows in turn.
+    rows: [Vec<[f64; 2]>; STRIDE],
 }
 
 /// Coordinates within one block, linear: value at its middle and change per level pixel.
@@ -46,37 +48,34 @@ impl PhaseMap {
             let row = &level.rays[position(gy, ny) * nx..][..nx];
             self.coarse.extend((0..cx).map(|gx| exact(chart, &row[position(gx, nx)])));
         }
+        self.s.clear();
         self.s.resize(nx * ny, [f32::NAN; 2]);
         // The last column and row of exact nodes may be nearer than the others: cubics only run inside the even part.
         let even = |n: usize| (n - 1) / STRIDE;
-        for y in 0..ny {
-            let (gy, ty) = (y / STRIDE, y % STRIDE);
-            for x in 0..nx {
-                let (gx, tx) = (x / STRIDE, x % STRIDE);
-                let out = &mut self.s[y * nx + x];
-                if tx == 0 && ty == 0 {
-                    *out = self.coarse[gy * cx + gx].map(|s| s as f32);
-                    continue;
+        let inside = |g: usize, n: usize| g >= 1 && g + 2 <= even(n);
+        for gy in 0..cy {
+            // Row `gy` of exact nodes, cubic along it.
+            let row = &self.coarse[gy * cx..][..cx];
+            let out = &mut self.rows[gy % STRIDE];
+            out.clear();
+            out.resize(nx, [f64::NAN; 2]);
+            for gx in (0..cx).filter(|g| inside(*g, nx)) {
+                for (t, o) in out[gx * STRIDE..][..STRIDE].iter_mut().enumerate() {
+                    *o = cubic(t, |i| row[gx + i - 1]);
                 }
-                let inside = gx >= 1 && gy >= 1 && gx + 2 <= even(nx) && gy + 2 <= even(ny);
-                let cubic = inside.then(|| {
-                    let (wx, wy) = (catmull(tx), catmull(ty));
-                    let mut sum = [0.0f64; 2];
-                    for (j, wy) in wy.iter().enumerate() {
-                        for (i, wx) in wx.iter().enumerate() {
-                            let c = &self.coarse[(gy + j - 1) * cx + gx + i - 1];
-                            sum[0] += wx * wy * c[0];
-                            sum[1] += wx * wy * c[1];
-                        }
-                    }
-                    sum
-                });
-                // Where the cubic has no neighbours (the rim) or a neighbour is invisible: exact.
-                *out = match cubic {
-                    Some(s) if s[0].is_finite() => s.map(|s| s as f32),
-                    _ => exact(chart, &level.rays[y * nx + x]).map(|s| s as f32),
-                };
             }
+            // With it the four rows about the gap above the last are there.
+            let Some(gap) = gy.checked_sub(2).filter(|gap| inside(*gap, ny)) else { continue };
+            for t in 0..STRIDE {
+                let out = &mut self.s[(gap * STRIDE + t) * nx..][..nx];
+                for (x, o) in out.iter_mut().enumerate() {
+                    *o = cubic(t, |j| self.rows[(gap + j - 1) % STRIDE][x]).map(|s| s as f32);
+                }
+            }
+        }
+        // Where the cubic has no neighbours (the rim) or a neighbour is invisible: exact.
+        for (s, ray) in self.s.iter_mut().zip(&level.rays).filter(|(s, _)| s[0].is_nan()) {
+            *s = exact(chart, ray).map(|s| s as f32);
         }
     }
 
@@ -105,8 +104,22 @@ fn exact(chart: &Chart, ray: &[f64; 2]) -> [f64; 2] {
     chart.at(ray[0], ray[1]).map_or([f64::NAN; 2], |p| p.s)
 }
 
-fn catmull(t: usize) -> [f64; 4] {
+/// Catmull-Rom's cubic through four exact nodes, `t` steps after the second.
+#[inline]
+fn cubic(t: usize, node: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let t = t as f64 / STRIDE as f64;
     let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (-t + 2.0 * t2 - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
+    let weights = [
+        0.5 * (-t + 2.0 * t2 - t3),
+        0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
+        0.5 * (t + 4.0 * t2 - 3.0 * t3),
+        0.5 * (t3 - t2),
+    ];
+    let mut sum = [0.0; 2];
+    for (i, w) in weights.into_iter().enumerate() {
+        let n = node(i);
+        sum[0] += w * n[0];
+        sum[1] += w * n[1];
+    }
+    sum
 }

@@ -81,6 +81,8 @@ struct Ranking {
     kept: Vec<(usize, usize)>,
     /// How many more each octave of the depth may keep.
     room: Vec<usize>,
+    /// Of the first family, all that are not another's by a quarter turn.
+    directions: Vec<usize>,
 }
 
 fn basis(tilt: f64, azimuth: f64) -> Matrix3<f64> {
@@ -189,9 +191,10 @@ impl Search {
             for (w, sums) in walks.iter().zip(self.sums.chunks_exact_mut(steps)) {
                 let range = usize::from(w.first)..usize::from(w.end);
                 for (sum, p) in sums[range.clone()].iter_mut().zip(&self.power_of_step[range]) {
-                    let ix = (w.x * p + 0.5) as usize;
-                    let iy = (w.y * p + (SIZE / 2) as f32 + 0.5) as usize;
-                    *sum += power[(ix * SIZE + iy).min(COLUMNS * SIZE - 1)];
+                    // Whole numbers of 32 bits are what the processor rounds to in one step.
+                    let ix = (w.x * p + 0.5) as i32;
+                    let iy = (w.y * p + (SIZE / 2) as f32 + 0.5) as i32;
+                    *sum += power[((ix * SIZE as i32 + iy) as usize).min(COLUMNS * SIZE - 1)];
                 }
             }
         }
@@ -227,31 +230,31 @@ impl Search {
         // A quarter turn changes nothing on a square mesh but the crossing angle's name.
         let square = (a / b - 1.0).abs() < 1e-6 && (nominal - 90.0).abs() < 1e-6;
         let shift = (12.0 * (a / b).log2()).round() as isize;
-        let Ranking { best, kept, room } = &mut self.ranking;
+        let Ranking { best, kept, room, directions } = &mut self.ranking;
         for &angle in angles.iter().filter(|a| (20.0..=160.0).contains(*a)) {
             let half_skew = 0.5 * (90.0 - angle);
             let turn = ((180.0 - angle) / step_angle).round() as usize;
+            // First and second family's depths with the other in the table, and the directions that differ.
+            let first = self.depths.start.max((-shift).max(0) as usize);
+            let end = self.depths.end.min((self.depths.end as isize - shift).max(0) as usize);
+            let other = |i: usize| (i as isize + shift) as usize;
+            let roll = |k: usize| (k as f64 * step_angle + half_skew + 90.0).rem_euclid(180.0) - 90.0;
+            directions.clear();
+            directions.extend((0..DIRECTIONS).filter(|k| !square || (-45.0..45.0).contains(&roll(*k))));
             best.clear();
-            for n in 0..self.normals.len() {
-                for i in self.depths.clone() {
-                    let j = i as isize + shift;
-                    if j < 0 || j as usize >= self.depths.end {
-                        continue;
-                    }
-                    let mut top = (f32::NEG_INFINITY, 0);
-                    for k in 0..DIRECTIONS {
-                        let roll = (k as f64 * step_angle + half_skew + 90.0).rem_euclid(180.0) - 90.0;
-                        if square && !(-45.0..45.0).contains(&roll) {
-                            continue;
-                        }
-                        let at = |k: usize, i: usize| self.scores[(n * DIRECTIONS + k % DIRECTIONS) * steps + i];
-                        let (p, q) = (at(k, i), at(k + turn, j as usize));
+            for (n, scores) in self.scores.chunks_exact(DIRECTIONS * steps).enumerate() {
+                let from = best.len();
+                best.extend((first..end).map(|i| (f32::NEG_INFINITY, n, i, 0)));
+                for &k in directions.iter() {
+                    let one = &scores[k * steps..][..steps];
+                    let two = &scores[(k + turn) % DIRECTIONS * steps..][..steps];
+                    for top in &mut best[from..] {
+                        let (p, q) = (one[top.2], two[other(top.2)]);
                         let s = 0.5 * p.min(q) + 0.25 * (p + q);
                         if s > top.0 {
-                            top = (s, k);
+                            (top.0, top.3) = (s, k);
                         }
                     }
-                    best.push((top.0, n, i, top.1));
                 }
             }
             best.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -349,12 +352,22 @@ pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) 
     0.5 * a.min(b) + 0.25 * (a + b) - 0.5 * prior * prior
 }
 
-/// Coordinate ascent on rotation, depth and crossing angle.
-pub(crate) fn refine(bank: &Bank, scale: f64, scope: &Scope, start: &Candidate) -> Candidate {
+/// Rounds of a refinement that tell good candidates from others, and those that are worth it only for the good.
+pub(crate) const ROUGHLY: std::ops::Range<i32> = 0..2;
+pub(crate) const FINELY: std::ops::Range<i32> = 2..6;
+
+/// Coordinate ascent on rotation, depth and crossing angle, with ever shorter steps.
+pub(crate) fn refine(
+    bank: &Bank,
+    scale: f64,
+    scope: &Scope,
+    start: &Candidate,
+    rounds: std::ops::Range<i32>,
+) -> Candidate {
     let mut best = *start;
     best.score = fine_score(bank, scale, scope, &best);
-    let mut step = [0.06, 0.06, 0.03, 0.03, 0.07];
-    for _ in 0..6 {
+    for round in rounds {
+        let step = [0.06, 0.06, 0.03, 0.03, 0.07].map(|s| s * 0.6f64.powi(round));
         for p in 0..5 {
             if p == 4 && scope.angle_sigma <= 0.0 {
                 continue;
@@ -384,7 +397,6 @@ pub(crate) fn refine(bank: &Bank, scale: f64, scope: &Scope, start: &Candidate) 
                 }
             }
         }
-        step.iter_mut().for_each(|s| *s *= 0.6);
     }
     best
 }
@@ -400,7 +412,7 @@ pub(crate) fn add_rivals(bank: &Bank, scale: f64, scope: &Scope, range: (f64, f6
             if rival.depth < range.0 || rival.depth > range.1 {
                 continue;
             }
-            let rival = refine(bank, scale, scope, &rival);
+            let rival = refine(bank, scale, scope, &rival, ROUGHLY);
             if rival.score > 0.6 * best.score {
                 found.push(rival);
             }

@@ -31,13 +31,13 @@ impl Workspace {
         self.read_looks(surface, place, gain);
         let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, looks: [0.0; 2] }, [0.0; 2]);
         for place in self.tools.looks[0].iter().filter(|m| m.good) {
-            let window = Window { centre: place.site.pixel, radius: SEED * self.view.size };
-            let clearest = self.clearest(|_, m| window.weight(m.site.pixel));
+            let window = Window { centre: place.pixel, radius: SEED * self.view.size };
+            let clearest = self.clearest(|_, m| window.weight(m.pixel));
             // Range and normal are those on the axis: the nearer the better.
             let clear = clearest[0].0.min(clearest[1].0);
-            let score = clear * self.window(CENTRAL).weight(place.site.pixel);
+            let score = clear * self.window(CENTRAL).weight(place.pixel);
             if score > best.0 {
-                let seed = Seed { centre: place.site.pixel, looks: clearest.map(|c| c.1) };
+                let seed = Seed { centre: place.pixel, looks: clearest.map(|c| c.1) };
                 best = (score, seed, clearest.map(|c| c.2));
             }
         }
@@ -50,15 +50,16 @@ impl Workspace {
         for (k, look) in LOOKS.into_iter().enumerate() {
             self.comb(surface, place, 1.0, [look; 2], gain);
             let t = &mut self.tools;
-            std::mem::swap(&mut t.measurements, &mut t.looks[k]);
+            t.looks[k].clear();
+            t.looks[k].extend(t.measurements.iter().map(Said::new));
         }
     }
 
     /// Of each family how clear and in step its clearest look is in the tiles weighted so, that look, and where it has the twine, cycles.
-    fn clearest(&self, weight: impl Fn(usize, &Measurement) -> f64) -> [(f64, f64, f64); 2] {
+    fn clearest(&self, weight: impl Fn(usize, &Said) -> f64) -> [(f64, f64, f64); 2] {
         let mut best = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
-        for (look, measurements) in LOOKS.into_iter().zip(&self.tools.looks) {
-            for (best, z) in best.iter_mut().zip(together(measurements, &weight)) {
+        for (look, said) in LOOKS.into_iter().zip(&self.tools.looks) {
+            for (best, z) in best.iter_mut().zip(together(said, &weight)) {
                 let clear = z[0].hypot(z[1]);
                 if clear > best.0 {
                     *best = (clear, look, cycles(z));
@@ -70,13 +71,13 @@ impl Workspace {
 
     /// Moves a sheet that is right but for its period along itself, to where the twines of the tiles in the mask are. Returns how they
     /// look; `None` if waves of that period are not there at all.
-    pub(crate) fn slide(&mut self, surface: &mut Surface, level: usize) -> Option<Looks> {
+    pub(crate) fn slide(&mut self, surface: &mut Surface) -> Option<Looks> {
         surface.offset = [0.0; 2];
-        let place = (level, self.tools.tiling);
+        let place = (self.scale_for(surface.depth).0, self.tools.tiling);
         let gain = self.demodulate(surface, place, &Window::ALL);
         self.read_looks(surface, place, gain);
         let t = &self.tools;
-        let say = |k: usize, _: &Measurement| f64::from(t.mask.get(k).copied().unwrap_or(true));
+        let say = |k: usize, _: &Said| f64::from(t.mask.get(k).copied().unwrap_or(true));
         let all: f64 = t.looks[0].iter().enumerate().map(|(k, m)| say(k, m) * LOUD.sqrt()).sum();
         let clearest = self.clearest(say);
         surface.offset = clearest.map(|c| c.2);
@@ -84,15 +85,36 @@ impl Workspace {
     }
 }
 
-/// Sum of the unit vectors of both families' phases over the good tiles, each with as much say as its wave is clear; how strong it is says more of fish.
-fn together(measurements: &[Measurement], weight: &impl Fn(usize, &Measurement) -> f64) -> [[f64; 2]; 2] {
+/// What a tile says by one look.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Said {
+    /// Middle of the tile, full-resolution px.
+    pub pixel: [f64; 2],
+    pub good: bool,
+    /// Unit vectors of both families' phases, with as much say as their waves are clear; how strong they are says more of fish.
+    z: [[f64; 2]; 2],
+}
+
+impl Said {
+    fn new(m: &Measurement) -> Self {
+        let z = |f: usize| {
+            let say = m.snr[f].min(LOUD).sqrt();
+            let (sin, cos) = m.phase[f].sin_cos();
+            [say * cos, say * sin]
+        };
+        let z = if m.good { [z(0), z(1)] } else { [[0.0; 2]; 2] };
+        Self { pixel: m.site.pixel, good: m.good, z }
+    }
+}
+
+/// Weighted sum of what the good tiles say.
+fn together(said: &[Said], weight: &impl Fn(usize, &Said) -> f64) -> [[f64; 2]; 2] {
     let mut sum = [[0.0; 2]; 2];
-    for (k, m) in measurements.iter().enumerate().filter(|(_, m)| m.good) {
-        let w = weight(k, m);
-        for f in 0..2 {
-            let say = w * m.snr[f].min(LOUD).sqrt();
-            sum[f][0] += say * m.phase[f].cos();
-            sum[f][1] += say * m.phase[f].sin();
+    for (k, s) in said.iter().enumerate().filter(|(_, s)| s.good) {
+        let w = weight(k, s);
+        for (sum, z) in sum.iter_mut().zip(&s.z) {
+            sum[0] += w * z[0];
+            sum[1] += w * z[1];
         }
     }
     sum

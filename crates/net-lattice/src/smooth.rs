@@ -68,13 +68,15 @@ impl Smoother {
         self.half.resize(sw, sh);
         for y in 0..sh {
             let rows = (h - y * f).min(f);
-            let out = self.small.row_mut(y);
-            out.fill(0.0);
-            for r in 0..rows {
-                let src = image.row(y * f + r);
-                for (o, block) in out.iter_mut().zip(src.chunks(f)) {
-                    *o += block.iter().sum::<f32>() / (block.len() * rows) as f32;
+            self.line.clear();
+            self.line.extend_from_slice(image.row(y * f));
+            for r in 1..rows {
+                for (sum, p) in self.line.iter_mut().zip(image.row(y * f + r)) {
+                    *sum += p;
                 }
+            }
+            for (o, block) in self.small.row_mut(y).iter_mut().zip(self.line.chunks(f)) {
+                *o = block.iter().sum::<f32>() / (block.len() * rows) as f32;
             }
         }
         // The average over f px is itself a blur of (f² - 1) / 12, the interpolation one of about f² / 6.

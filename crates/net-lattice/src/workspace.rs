@@ -15,8 +15,9 @@ use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};
 use crate::map::PhaseMap;
 use crate::model::Model;
 use crate::numeric::clip_level;
+use crate::periods::Rival;
 use crate::search::{Candidate, Scope, Search};
-use crate::seed::Seed;
+use crate::seed::{Said, Seed};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
 use crate::stages::Stages;
@@ -46,6 +47,7 @@ pub(crate) struct Workspace {
     /// Those of one bank.
     pub found: Vec<Candidate>,
     pub locks: Vec<Lock>,
+    pub rivals: Vec<Rival>,
     /// Twine diameter, m.
     pub twine: f64,
     /// What the next picture starts from.
@@ -62,7 +64,7 @@ pub(crate) struct Tools {
     pub sums: Vec<TileSum>,
     pub measurements: Vec<Measurement>,
     /// The same by each look.
-    pub looks: [Vec<Measurement>; LOOKS.len()],
+    pub looks: [Vec<Said>; LOOKS.len()],
     pub observations: Vec<Observation>,
     pub fitter: Fitter,
     pub likelihood: Likelihood,
@@ -76,6 +78,8 @@ pub(crate) struct Tools {
     pub tiling: usize,
     /// Length of the filter of each level's `high`; zero for none yet.
     pub high: [f64; 4],
+    /// The level whose `high` the likelihood has.
+    pub loaded: Option<usize>,
     /// The same of `thin`, and the gain of the lock-in.
     pub thin: [(f64, f32); 4],
 }
@@ -84,6 +88,7 @@ impl Tools {
     /// Another picture: nothing is filtered yet.
     pub(crate) fn forget(&mut self) {
         self.high = [0.0; 4];
+        self.loaded = None;
         self.thin = [(0.0, 0.0); 4];
     }
 }
@@ -137,6 +142,7 @@ impl Workspace {
             candidates: Vec::new(),
             found: Vec::new(),
             locks: Vec::new(),
+            rivals: Vec::new(),
             twine: config.twine_diameter_m,
             last: None,
             stages: None,
@@ -163,9 +169,11 @@ impl Workspace {
     /// Makes sure that `high` of a level is filtered for drawing cells of `cell` px.
     pub(crate) fn high(&mut self, level: usize, cell: f64) {
         let sigma = self.view.high_pass_px(cell);
-        if self.tools.high[level] != sigma {
-            self.tools.high[level] = sigma;
-            self.view.levels[level].filter_high(sigma, &mut self.tools.smoother);
+        let t = &mut self.tools;
+        if t.high[level] != sigma {
+            t.high[level] = sigma;
+            t.loaded = t.loaded.filter(|loaded| *loaded != level);
+            self.view.levels[level].filter_high(sigma, &mut t.smoother);
         }
     }
 
@@ -293,7 +301,7 @@ impl Workspace {
         }
     }
 
-    /// Best gain of the drawing over polarities and blurs (px), every second block compared. Dark twine is the lattice half a cell off
+    /// Best gain of the drawing over polarities and blurs (px), one block in four compared. Dark twine is the lattice half a cell off
     /// with the opposite sign: the lock-in cannot tell it from bright twine, the drawing can.
     pub(crate) fn gain(
         &mut self,
@@ -307,8 +315,7 @@ impl Workspace {
         let area = self.view.levels[level].scale.powi(2);
         let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
         self.tools.map.fill(surface, &self.view.levels[level]);
-        self.tools.likelihood.load(&self.view.levels[level]);
-        self.tools.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
+        self.load_likelihood(level);
         for &blur in blurs {
             for &polarity in polarities {
                 let mut drawing = self.drawing(level, cell, polarity, blur);
@@ -329,23 +336,34 @@ impl Workspace {
         }
         best
     }
-    /// Refines on the drawing: one shift per tile and pass, the sheet fitted to those.
+
+    /// Makes sure that the likelihood has the high-passed picture of a level, and the twine's width.
+    pub(crate) fn load_likelihood(&mut self, level: usize) {
+        let t = &mut self.tools;
+        if t.loaded != Some(level) {
+            t.loaded = Some(level);
+            t.likelihood.load(&self.view.levels[level]);
+        }
+        t.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
+    }
+
+    /// Refines on the drawing, of all blocks or one in four: one shift per tile and pass, the sheet fitted to those.
     pub(crate) fn likelihood(
         &mut self,
         surface: &Surface,
         lock: &Lock,
         model: Model,
         passes: usize,
+        sparse: bool,
     ) -> Option<(Fit, Robust)> {
         let cell = self.cell_px(surface.depth);
         let level = self.view.level_for(self.short_px(surface.depth), 20.0);
         let tiling = self.view.tiling_for(cell);
         self.high(level, cell);
-        let drawing = self.drawing(level, cell, lock.polarity, lock.blur);
+        self.load_likelihood(level);
+        let drawing = Drawing { sparse, ..self.drawing(level, cell, lock.polarity, lock.blur) };
         let t = &mut self.tools;
         let view = &self.view.levels[level];
-        t.likelihood.load(view);
-        t.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
         let mut fit = None;
         let mut surface = *surface;
         for _ in 0..passes {

@@ -1,0 +1,119 @@
+//! Which cell is the true one: a net at a third of the distance with a third of the meshes is nearly the same picture.
+
+use crate::comb::Looks;
+use crate::likelihood::Polarity;
+use crate::lockin::Window;
+use crate::surface::Surface;
+use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
+
+/// Rival depths: scaling depth by m scales every phase by m.
+const RIVALS: [f64; 12] = [1.0 / 7.0, 1.0 / 6.0, 0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Agreeing tiles without which all of the picture tells between rival periods.
+const FEWEST: usize = 4;
+/// How often the period may change.
+const CHANGES: usize = 3;
+/// Blurs, px, of which the drawing that tells between rivals takes the best.
+const BLURS: [f64; 3] = [0.76, 1.5, 2.8];
+
+/// A lattice of another period in the place of the one that was locked to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rival {
+    /// Its depth over that of the lock.
+    scale: f64,
+    surface: Surface,
+    looks: Looks,
+    gain: f64,
+    polarity: Polarity,
+}
+
+impl Workspace {
+    /// Tests the rival periods until the best is the lock itself; returns it, and the share of its gain by which the second falls short. A rival may have
+    /// rivals of its own: from the third harmonic of a net half as far as it, say.
+    pub(crate) fn true_period(&mut self, mut lock: Lock) -> Option<(Lock, f64)> {
+        let mut rivals = std::mem::take(&mut self.rivals);
+        let mut margin = Some(1.0);
+        for _ in 0..CHANGES {
+            let before = lock.surface.depth;
+            margin = self.challenge(&mut lock, &mut rivals);
+            if margin.is_none() || lock.surface.depth == before {
+                break;
+            }
+            if let Some(surface) = self.lock_whole(&lock) {
+                lock.surface = surface;
+            }
+        }
+        self.rivals = rivals;
+        self.tools.mask.clear();
+        margin.map(|margin| (lock, margin))
+    }
+
+    /// Puts the best of the rival periods in the place of the lock; returns by how much of its gain the second falls short.
+    fn challenge(&mut self, lock: &mut Lock, rivals: &mut Vec<Rival>) -> Option<f64> {
+        let cell = self.short_px(lock.surface.depth);
+        let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
+        let smallest = SMALLEST_CELL * 0.9 * self.view.reduction as f64;
+        let possible = |m: &f64| *m == 1.0 || (cell / m > smallest && cell / m < span);
+        self.look_where(lock);
+        rivals.clear();
+        for m in RIVALS.into_iter().filter(possible) {
+            let mut surface = lock.surface;
+            let mut looks = lock.seed.looks;
+            if m != 1.0 {
+                surface = surface.scaled(m);
+                let Some(seen) = self.slide(&mut surface) else { continue };
+                looks = seen;
+            }
+            rivals.push(Rival { scale: m, surface, looks, gain: 0.0, polarity: lock.polarity });
+        }
+        let (first, last) = (rivals.first()?.scale, rivals.last()?.scale);
+        // All in one comparison: fine enough for the smallest cells, and filtered for the widest.
+        let level = self.view.level_for(cell / last, 6.0);
+        let widest = self.cell_px(lock.surface.depth * first);
+        (_, _, lock.blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &BLURS);
+        for r in rivals.iter_mut() {
+            (r.gain, r.polarity, _) = self.gain(&r.surface, level, widest, &Polarity::BOTH, &[lock.blur]);
+        }
+        rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        // The best and the second of them by worth, which is at most the gain.
+        let (mut best, mut second) = ((f64::NEG_INFINITY, 0), f64::NEG_INFINITY);
+        for (k, r) in rivals.iter().enumerate() {
+            if r.gain <= second {
+                break;
+            }
+            let worth = if r.gain > 0.0 { r.gain * self.all_there(r) } else { r.gain };
+            if worth > best.0 {
+                second = best.0;
+                best = (worth, k);
+            } else {
+                second = second.max(worth);
+            }
+        }
+        let (gain, r) = (best.0, rivals[best.1]);
+        // Nothing beside it: the empty picture is the rival.
+        let second = if second.is_finite() { second } else { 0.0 };
+        lock.seed.looks = r.looks;
+        (lock.surface, lock.start) = (r.surface, lock.start.scaled(r.scale));
+        (lock.gain, lock.polarity) = (r.gain, r.polarity);
+        Some((gain - second) / gain.abs().max(1e-9))
+    }
+
+    /// Rivals share the tiles in which the lattice is: what a drawing explains of a fish must not tell between them.
+    fn look_where(&mut self, lock: &Lock) {
+        let place = self.scale_for(lock.surface.depth);
+        self.measure_comb(&lock.surface, place, lock.seed.looks, &Window::ALL);
+        let t = &mut self.tools;
+        t.tiling = place.1;
+        t.mask.clear();
+        t.mask.extend(t.measurements.iter().map(|m| m.aligned()));
+        if t.mask.iter().filter(|m| **m).count() < FEWEST {
+            t.mask.clear();
+        }
+    }
+
+    /// A lattice of which only every second or third line is there draws most of the picture, too: 1 if all are, 0 if they are not.
+    fn all_there(&mut self, rival: &Rival) -> f64 {
+        let place = self.scale_for(rival.surface.depth);
+        self.measure_comb(&rival.surface, place, rival.looks, &Window::ALL);
+        1.0 - (2.0 * self.fold(&rival.surface, place).unlike).min(1.0)
+    }
+}
