@@ -25,6 +25,7 @@ impl Workspace {
         margin: f64,
         labels: Option<Labels>,
     ) -> Option<LatticeEstimate> {
+        let followed = labels.is_some();
         let (fit, robust) = self.likelihood(surface, lock, model, 1, false)?;
         let surface = fit.surface;
         let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
@@ -46,10 +47,13 @@ impl Workspace {
             &mut t.scores,
         );
         let errors = covariance::pose(&surface, &labels, &c, count);
-        let place = self.scale_for(surface.depth);
+        let scale = if followed { Self::coarse_scale_for } else { Self::scale_for };
+        let place = scale(self, surface.depth);
         let evidence = self.weigh(&surface, place, lock.polarity, lock.seed.looks);
         let mean_plane = self.mean_plane(&surface);
-        let evidence = evidence.folded(self.fold(&surface, place));
+        // What the average cell looks like does not change from picture to picture.
+        let fold = if followed { lock.evidence.fold() } else { self.fold(&surface, place) };
+        let evidence = evidence.folded(fold);
         let evidence = Evidence { above: lock.above, ..evidence };
         let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
         let odd = labels.turns % 2 == 1;

@@ -148,6 +148,11 @@ impl Evidence {
         self
     }
 
+    /// What the average cell looked like.
+    pub(crate) fn fold(&self) -> Fold {
+        Fold { separable: self.separable, balance: self.balance, unlike: self.unlike, snr: self.cell_snr }
+    }
+
     /// Adds the angle between tangent and mean plane.
     pub(crate) fn bent_by(mut self, angle: f64) -> Self {
         self.bend = angle;

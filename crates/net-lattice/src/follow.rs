@@ -22,7 +22,8 @@ impl Workspace {
         surface.offset = start.offset.map(|o| o - half);
         let seed = Seed { centre: self.view.centre, looks: last.looks };
         let model = last.model.max(Model::Rhomb);
-        surface = self.lock(&surface, &[(250.0, Model::Rhomb), (2000.0, model)], seed)?;
+        let place = self.coarse_scale_for(start.depth);
+        surface = self.lock_on(place, &surface, &[(250.0, Model::Rhomb), (2000.0, model)], seed)?;
         surface.offset = surface.offset.map(|o| o + half);
         let lock = Lock {
             score: 0.0,

@@ -194,6 +194,11 @@ impl Workspace {
         (self.view.level_for(self.short_px(depth), 12.0), self.view.tiling_for(self.cell_px(depth)))
     }
 
+    /// The same for a net that is followed: two harmonics are enough to go on.
+    pub(crate) fn coarse_scale_for(&self, depth: f64) -> (usize, usize) {
+        (self.view.level_for(self.short_px(depth), 8.0), self.view.tiling_for(self.cell_px(depth)))
+    }
+
     /// The sums of a lock-in at the predicted sheet; returns the gain they were taken with.
     pub(crate) fn demodulate(&mut self, surface: &Surface, place: (usize, usize), window: &Window) -> f32 {
         let gain = self.thin(place.0, self.cell_px(surface.depth));
@@ -260,8 +265,18 @@ impl Workspace {
 
     /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
     pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], seed: Seed) -> Option<Surface> {
+        self.lock_on(self.scale_for(start.depth), start, schedule, seed)
+    }
+
+    /// The same on a level and tiling.
+    pub(crate) fn lock_on(
+        &mut self,
+        place: (usize, usize),
+        start: &Surface,
+        schedule: &[(f64, Model)],
+        seed: Seed,
+    ) -> Option<Surface> {
         let mut surface = *start;
-        let place = self.scale_for(surface.depth);
         for &(radius, model) in schedule {
             let window = Window { centre: seed.centre, radius: radius * self.view.size };
             self.measure_comb(&surface, place, seed.looks, &window);
