@@ -4,12 +4,35 @@
 use net_image::Image;
 
 use crate::fit::Observation;
-use crate::map::PhaseMap;
+use crate::map::{PhaseMap, Plane};
 use crate::numeric::{log2_rough, magnitude_quantiles, median, wrap};
 use crate::smooth::Smoother;
 use crate::surface::Surface;
-use crate::template::{Profile, look_up};
+use crate::template::{Profile, look_up_all};
 use crate::view::{BLOCK, Level, TileGrid};
+
+/// Sum of a function of the blocks' pixels, four sums side by side: what the processor adds at once.
+#[inline]
+fn total<const N: usize>(blocks: [&Block; N], f: impl Fn([f32; N]) -> f32) -> f32 {
+    let mut sums = [0.0; 4];
+    for k in (0..PIXELS).step_by(4) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += f(std::array::from_fn(|n| blocks[n][k + lane]));
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// Cells from the nearest twine, of a block's pixels.
+#[inline]
+fn positions(plane: &Plane, offset: f32) -> Block {
+    let mut q = [0.0; PIXELS];
+    for (k, q) in q.iter_mut().enumerate() {
+        let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
+        *q = wrap(plane.s + offset + plane.du * u + plane.dv * v);
+    }
+    q
+}
 
 /// Gives blocks that a sparse comparison leaves out the mean of those beside them.
 fn fill_in(blocks: &mut Image<f32>) {
@@ -155,23 +178,21 @@ impl Likelihood {
                     self.profiles[f].row(drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt())
                 });
                 let (t, d1, d2) = (&mut self.drawn[b], &mut self.d1[b], &mut self.d2[b]);
-                let mut sum = 0.0;
-                for k in 0..PIXELS {
-                    let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
-                    let at = |p: &crate::map::Plane| wrap(p.s + drawing.offset + p.du * u + p.dv * v);
-                    let (q1, q2) = (at(&planes[0]), at(&planes[1]));
-                    if SLOPES {
-                        let (p1, g1) = look_up(rows[0], q1);
-                        let (p2, g2) = look_up(rows[1], q2);
-                        t[k] = 1.0 - (1.0 - p1) * (1.0 - p2);
-                        d1[k] = (1.0 - p2) * g1;
-                        d2[k] = (1.0 - p1) * g2;
-                    } else {
-                        t[k] = 1.0 - (1.0 - look_up(rows[0], q1).0) * (1.0 - look_up(rows[1], q2).0);
+                let [q1, q2] = planes.map(|p| positions(&p, drawing.offset));
+                if SLOPES {
+                    let ((p1, g1), (p2, g2)) = (look_up_all(rows[0], &q1), look_up_all(rows[1], &q2));
+                    for k in 0..PIXELS {
+                        t[k] = 1.0 - (1.0 - p1[k]) * (1.0 - p2[k]);
+                        d1[k] = (1.0 - p2[k]) * g1[k];
+                        d2[k] = (1.0 - p1[k]) * g2[k];
                     }
-                    sum += t[k];
+                } else {
+                    let (p1, p2) = (look_up_all(rows[0], &q1).0, look_up_all(rows[1], &q2).0);
+                    for k in 0..PIXELS {
+                        t[k] = 1.0 - (1.0 - p1[k]) * (1.0 - p2[k]);
+                    }
                 }
-                *mean = sum / PIXELS as f32;
+                *mean = total([t], |[t]| t) / PIXELS as f32;
             }
         }
         if drawing.sparse {
@@ -191,10 +212,8 @@ impl Likelihood {
         for b in 0..self.used.len() {
             let (mut num, mut den) = (0.0f32, 0.0f32);
             if self.used[b] {
-                for (i, t) in self.image[b].iter().zip(&self.drawn[b]) {
-                    num += i * t;
-                    den += t * t;
-                }
+                num = total([&self.image[b], &self.drawn[b]], |[i, t]| i * t);
+                den = total([&self.drawn[b]], |[t]| t * t);
             }
             self.num.data_mut()[b] = num;
             self.den.data_mut()[b] = den;
@@ -266,7 +285,7 @@ impl Likelihood {
             }
             // Without a drawing the picture itself is the residual.
             let a = if self.used[b] { self.amplitude.data()[b] } else { 0.0 };
-            let sum: f32 = self.image[b].iter().zip(&self.drawn[b]).map(|(i, t)| (i - a * t).powi(2).min(clip)).sum();
+            let sum = total([&self.image[b], &self.drawn[b]], |[i, t]| (i - a * t).powi(2).min(clip));
             self.num.data_mut()[b] = sum / PIXELS as f32;
         }
         if drawing.sparse {
@@ -285,24 +304,21 @@ impl Likelihood {
                 }
                 let variance = self.variance.data()[b].max(1e-7);
                 let per = 1.0 / variance.sqrt();
-                let mut sums = [0.0f32; 5];
+                let (mut r, mut w) = ([0.0; PIXELS], [0.0; PIXELS]);
                 for k in 0..PIXELS {
-                    let r = self.image[b][k] - a * self.drawn[b][k];
-                    let e = r.abs() * per;
-                    let w = if e < 3.0 {
-                        1.0
-                    } else if e < 6.0 {
-                        3.0 / e
-                    } else {
-                        0.0
-                    };
-                    let (d1, d2) = (a * self.d1[b][k], a * self.d2[b][k]);
-                    sums[0] += w * d1 * r;
-                    sums[1] += w * d2 * r;
-                    sums[2] += w * d1 * d1;
-                    sums[3] += w * d1 * d2;
-                    sums[4] += w * d2 * d2;
+                    r[k] = self.image[b][k] - a * self.drawn[b][k];
+                    let e = r[k].abs() * per;
+                    let less = 3.0 / e.max(3.0);
+                    w[k] = if e < 6.0 { less } else { 0.0 };
                 }
+                let (d1, d2) = (&self.d1[b], &self.d2[b]);
+                let sums = [
+                    a * total([&w, d1, &r], |[w, d, r]| w * d * r),
+                    a * total([&w, d2, &r], |[w, d, r]| w * d * r),
+                    a * a * total([&w, d1, d1], |[w, d, e]| w * d * e),
+                    a * a * total([&w, d1, d2], |[w, d, e]| w * d * e),
+                    a * a * total([&w, d2, d2], |[w, d, e]| w * d * e),
+                ];
                 let tile = &mut tiles[usize::from(grid.column[x])];
                 for (t, s) in tile.iter_mut().zip(sums) {
                     *t += f64::from(s / variance);

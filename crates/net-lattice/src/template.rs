@@ -65,6 +65,28 @@ pub(crate) fn look_up(row: &[[f32; 2]; POSITIONS + 1], q: f32) -> (f32, f32) {
     (a[0] + f * (b[0] - a[0]), (a[1] + f * (b[1] - a[1])).copysign(a[1] * q))
 }
 
+/// The same for many places.
+#[inline]
+pub(crate) fn look_up_all<const N: usize>(row: &[[f32; 2]; POSITIONS + 1], q: &[f32; N]) -> ([f32; N], [f32; N]) {
+    // The steps of the table and what is left of them first, then what stands there, then the line between: the first and the last side by side.
+    let (mut step, mut part) = ([0; N], [0.0; N]);
+    for k in 0..N {
+        let x = q[k].abs() * (2 * POSITIONS) as f32;
+        step[k] = (x as i32).clamp(0, POSITIONS as i32 - 1);
+        part[k] = x - step[k] as f32;
+    }
+    let (mut from, mut to) = ([[0.0; 2]; N], [[0.0; 2]; N]);
+    for k in 0..N {
+        (from[k], to[k]) = (row[step[k] as usize], row[step[k] as usize + 1]);
+    }
+    let (mut value, mut slope) = ([0.0; N], [0.0; N]);
+    for k in 0..N {
+        value[k] = from[k][0] + part[k] * (to[k][0] - from[k][0]);
+        slope[k] = (from[k][1] + part[k] * (to[k][1] - from[k][1])).copysign(from[k][1] * q[k]);
+    }
+    (value, slope)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
