@@ -11,6 +11,7 @@ use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
 use crate::search;
+use crate::seed::Seed;
 use crate::stages::Stages;
 use crate::surface::Surface;
 use crate::workspace::{LOUDEST, Lock, Workspace};
@@ -25,6 +26,9 @@ const COLD: [(f64, Model); 7] = [
     (2000.0, Model::Quartic),
     (2000.0, Model::Quartic),
 ];
+/// Radii, px of an 848 x 480 px picture, within which a sheet may be fitted, and the share of the tiles there that agree if it follows the net.
+const FOCUS: [f64; 4] = [f64::INFINITY, 420.0, 300.0, 220.0];
+const FOLLOWED: f64 = 0.9;
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 
@@ -33,6 +37,8 @@ const CANDIDATES: (usize, usize) = (3, 8);
 const SURE: f64 = 5.5;
 /// Share of a candidate's score below which another is nothing beside it.
 const PART: f64 = 0.45;
+/// How often a sheet is followed outwards from where it is sure.
+const OUTWARDS: usize = 3;
 /// Candidates of a bank of tiles that are refined to the end.
 const REFINED: usize = 16;
 /// Candidates that are looked through for a second net.
@@ -66,7 +72,18 @@ impl Workspace {
             let level = self.view.level_for(self.short_px(surface.depth), 12.0);
             let cell = self.cell_px(surface.depth);
             let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
-            locks.push(Lock { score: c.score, above: c.above, surface, start, seed, evidence, gain, polarity, blur });
+            locks.push(Lock {
+                score: c.score,
+                above: c.above,
+                surface,
+                start,
+                seed,
+                evidence,
+                gain,
+                polarity,
+                blur,
+                focus: f64::INFINITY,
+            });
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
             if settled.is_none() && coherence > 0.8 && evidence.good > 0.9 {
                 settled = Some((surface, c.score));
@@ -76,6 +93,7 @@ impl Workspace {
         self.locks = locks;
         let lock = self.elsewhere(lock?);
         let (mut lock, margin) = self.true_period(lock)?;
+        self.focus(&mut lock);
         self.seat(&mut lock);
         self.stages = Some(Stages::new(&lock.start, &lock.surface));
         self.finish(config, lock, margin)
@@ -133,12 +151,14 @@ impl Workspace {
         }
         let first = best;
         let mut top = self.agreement(&first.surface, first.seed.looks).0;
-        if let Some(surface) = self.counted_out(&first) {
+        for _ in 0..OUTWARDS {
+            let Some(surface) = self.followed_outwards(&best) else { break };
             let (score, evidence) = self.agreement(&surface, first.seed.looks);
-            if score > top {
-                top = score;
-                best = Lock { surface, evidence, ..first };
+            if score <= top {
+                break;
             }
+            top = score;
+            best = Lock { surface, evidence, ..first };
         }
         for (x, y) in [(0.0, 0.0), (OTHER, 0.0), (-OTHER, 0.0), (0.0, OTHER), (0.0, -OTHER)] {
             let turn = Rotation3::new(Vector3::new(x, y, 0.0)).into_inner();
@@ -167,23 +187,60 @@ impl Workspace {
         self.lock(&lock.surface, &COLD[2..], lock.seed)
     }
 
-    /// The sheet fitted to phases whose whole cycles are counted from tile to tile, and locked again.
-    fn counted_out(&mut self, lock: &Lock) -> Option<Surface> {
+    /// The sheet fitted to what is found tile by tile from where it is sure outwards, and locked again.
+    fn followed_outwards(&mut self, lock: &Lock) -> Option<Surface> {
         let place = self.scale_for(lock.surface.depth);
-        self.measure_comb(&lock.surface, place, lock.seed.looks, &Window::ALL);
+        let gain = self.demodulate(&lock.surface, place, &Window::ALL);
+        let comb = self.comb(&lock.surface, place, 1.0, lock.seed.looks, gain);
+        let level = &self.view.levels[place.0];
+        let grid = &level.tiles[place.1];
         let t = &mut self.tools;
-        t.unwrapper.run(&t.measurements, self.view.levels[place.0].tiles[place.1].nx);
-        t.observations.clear();
-        for (m, cycles) in t.measurements.iter().zip(&t.unwrapper.cycles) {
-            let cycles = cycles.filter(|_| !m.empty);
-            let w = |f: usize| cycles.map_or(0.0, |_| m.snr[f].min(LOUDEST) * std::f64::consts::TAU.powi(2));
-            let c = cycles.unwrap_or_default();
-            let s = [m.predicted.s[0] + c[0], m.predicted.s[1] + c[1]];
-            t.observations.push(Observation { site: m.site, s, weight: [w(0), 0.0, w(1)] });
+        if t.spread.start(&t.measurements, grid) == t.spread.grow(level, grid, &comb, gain) {
+            return None;
         }
-        let robust = Robust::Family(0.25);
-        let fit = t.fitter.fit(&lock.surface, Model::Quartic.parameters(), &t.observations, robust, &self.prior, 5)?;
-        self.lock(&fit.surface, &COLD[5..], lock.seed)
+        t.observations.clear();
+        for (site, known) in grid.sites.iter().zip(&t.spread.known) {
+            let w = |f: usize| known.map_or(0.0, |k| k.snr[f].min(LOUDEST) * std::f64::consts::TAU.powi(2));
+            let s = known.map_or([0.0; 2], |k| k.s);
+            t.observations.push(Observation { site: *site, s, weight: [w(0), 0.0, w(1)] });
+        }
+        // From the stiffest on: a sheet that curls up somewhere is no place to start from.
+        let mut surface = lock.surface.truncated(Model::Rhomb.parameters(), self.prior.angle);
+        for (model, scale) in [
+            (Model::Rhomb, 1.0),
+            (Model::Quadratic, 1.0),
+            (Model::Cubic, 0.5),
+            (Model::Quartic, 0.25),
+            (Model::Quartic, 0.12),
+        ] {
+            let robust = Robust::Family(scale);
+            surface = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 4)?.surface;
+        }
+        self.lock(&surface, &COLD[5..], lock.seed)
+    }
+
+    /// A polynomial sheet does not follow a net that bends in many ways all over the picture, and what it misses at the rim it makes up for on the axis,
+    /// where range and normal are claimed. Fits it to as much about the axis as it follows.
+    fn focus(&mut self, lock: &mut Lock) {
+        let place = self.scale_for(lock.surface.depth);
+        let mut best = 0.0;
+        for radius in FOCUS {
+            let mut surface = lock.surface;
+            if radius.is_finite() {
+                let seed = Seed { centre: self.view.centre, ..lock.seed };
+                let Some(locked) = self.lock(&surface, &[(radius, Model::Quartic); 3], seed) else { continue };
+                surface = locked;
+            }
+            self.measure_comb(&surface, place, lock.seed.looks, &Window::ALL);
+            let good = self.evidence_within(radius).good;
+            if good > best {
+                best = good;
+                (lock.focus, lock.surface) = (radius, surface);
+            }
+            if good > FOLLOWED {
+                break;
+            }
+        }
     }
 
     /// How well the tiles agree with a locked sheet.

@@ -49,7 +49,7 @@ impl Workspace {
         let errors = covariance::pose(&surface, &labels, &c, count);
         let scale = if followed { Self::coarse_scale_for } else { Self::scale_for };
         let place = scale(self, surface.depth);
-        let evidence = self.weigh(&surface, place, lock.polarity, lock.seed.looks);
+        let evidence = self.weigh(&surface, place, lock);
         let mean_plane = self.mean_plane(&surface);
         // What the average cell looks like does not change from picture to picture.
         let fold = if followed { lock.evidence.fold() } else { self.fold(&surface, place) };
@@ -76,6 +76,7 @@ impl Workspace {
             model,
             polarity: lock.polarity,
             looks: lock.seed.looks,
+            focus: lock.focus,
             blur: lock.blur,
             surface,
             labels,

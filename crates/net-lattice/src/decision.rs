@@ -82,8 +82,8 @@ impl Usual {
 }
 
 impl Evidence {
-    /// From the tiles; those within `near` of the optical axis are where range and normal are claimed.
-    pub(crate) fn new(measurements: &[Measurement], near: Window, scratch: &mut Vec<f64>) -> Self {
+    /// From the tiles within a window; those within `near` of the optical axis are where range and normal are claimed.
+    pub(crate) fn new(measurements: &[Measurement], near: Window, within: Window, scratch: &mut Vec<f64>) -> Self {
         let usual = Usual::new(measurements, scratch);
         let mut e = Self::default();
         let mut sum = [0.0; 2];
@@ -93,14 +93,13 @@ impl Evidence {
         let (mut aligned_near, mut silent_near) = (0usize, 0usize);
         for m in measurements {
             let hides = m.good && usual.is_some_and(|u| u.hides(m));
-            let (u, v) = (m.site.pixel[0] - near.centre[0], m.site.pixel[1] - near.centre[1]);
-            if u.hypot(v) <= near.radius {
+            if near.holds(m.site.pixel) {
                 e.near[1] += 1;
                 e.near[0] += usize::from(m.good);
                 silent_near += usize::from(m.empty || hides);
                 aligned_near += usize::from(m.aligned());
             }
-            if !m.good {
+            if !m.good || !within.holds(m.site.pixel) {
                 continue;
             }
             e.tiles += 1;

@@ -49,6 +49,8 @@ pub struct LatticeEstimate {
     pub blur: f64,
     /// How the twine looks to the lock-in.
     pub(crate) looks: Looks,
+    /// Standard deviation of the window about the optical axis in which the sheet was fitted, px of an 848 x 480 px picture.
+    pub(crate) focus: f64,
     /// The sheet itself.
     pub(crate) surface: Surface,
     /// Internal families to the net frame's: quarter turns, and the node that is the origin (internal coordinates).
@@ -152,6 +154,7 @@ pub(crate) struct Followed {
     pub polarity: Polarity,
     pub blur: f64,
     pub looks: Looks,
+    pub focus: f64,
     pub model: Model,
     pub evidence: Evidence,
     pub gain: f64,
@@ -167,6 +170,7 @@ impl LatticeEstimate {
             polarity: self.polarity,
             blur: self.blur,
             looks: self.looks,
+            focus: self.focus,
             model: self.model,
             evidence: self.evidence,
             gain: self.gain,

@@ -23,7 +23,7 @@ impl Workspace {
         let seed = Seed { centre: self.view.centre, looks: last.looks };
         let model = last.model.max(Model::Rhomb);
         let place = self.coarse_scale_for(start.depth);
-        surface = self.lock_on(place, &surface, &[(250.0, Model::Rhomb), (2000.0, model)], seed)?;
+        surface = self.lock_on(place, &surface, &[(250.0, Model::Rhomb), (last.focus, model)], seed)?;
         surface.offset = surface.offset.map(|o| o + half);
         let lock = Lock {
             score: 0.0,
@@ -35,6 +35,7 @@ impl Workspace {
             gain: last.gain * self.view.levels[0].raw.data().len() as f64,
             polarity: last.polarity,
             blur: last.blur,
+            focus: last.focus,
         };
         self.conclude(config, &surface, &lock, last.model, last.margin, Some(last.labels))
     }

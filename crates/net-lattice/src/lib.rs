@@ -69,10 +69,10 @@ mod search;
 mod seed;
 mod smooth;
 mod spectra;
+mod spread;
 mod stages;
 mod surface;
 mod template;
-mod unwrap;
 mod view;
 mod workspace;
 

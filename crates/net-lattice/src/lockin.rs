@@ -71,6 +71,11 @@ impl Window {
     /// Everything.
     pub(crate) const ALL: Self = Self { centre: [0.0; 2], radius: f64::INFINITY };
 
+    /// Whether a place is within one radius.
+    pub(crate) fn holds(&self, pixel: [f64; 2]) -> bool {
+        (pixel[0] - self.centre[0]).hypot(pixel[1] - self.centre[1]) <= self.radius
+    }
+
     /// Weight of a place.
     pub(crate) fn weight(&self, pixel: [f64; 2]) -> f64 {
         let (u, v) = (pixel[0] - self.centre[0], pixel[1] - self.centre[1]);
@@ -122,7 +127,7 @@ type Lanes = [f32; LANES];
 
 /// Sums over the blocks of one tile in one row of blocks.
 #[derive(Default)]
-struct Run {
+pub(crate) struct Run {
     re: Lanes,
     im: Lanes,
     power: f32,
@@ -131,7 +136,7 @@ struct Run {
 }
 
 impl Run {
-    fn add(&mut self, pixels: &[[f32; BLOCK]; BLOCK], planes: &[Plane; 2]) {
+    pub(crate) fn add(&mut self, pixels: &[[f32; BLOCK]; BLOCK], planes: &[Plane; 2]) {
         self.whole += pixels.iter().flatten().map(|p| p * p).sum::<f32>();
         let p = pixels.map(|row| row.map(|i| i.clamp(-1.0, 1.0)));
         self.power += p.iter().flatten().map(|p| p * p).sum::<f32>();
@@ -158,7 +163,7 @@ impl Run {
         }
     }
 
-    fn flush(&self, tile: &mut TileSum) {
+    pub(crate) fn flush(&self, tile: &mut TileSum) {
         for (l, (re, im)) in self.re.iter().zip(&self.im).enumerate() {
             let z = &mut tile.z[l / HARMONICS][l % HARMONICS];
             z[0] += f64::from(*re);

@@ -20,9 +20,9 @@ use crate::search::{Candidate, Scope, Search};
 use crate::seed::{Said, Seed};
 use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
+use crate::spread::Spread;
 use crate::stages::Stages;
 use crate::surface::{self, Params, Surface};
-use crate::unwrap::Unwrapper;
 use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
@@ -72,7 +72,7 @@ pub(crate) struct Tools {
     pub scratch: Vec<f64>,
     pub scores: Vec<(usize, Params)>,
     pub folder: Folder,
-    pub unwrapper: Unwrapper,
+    pub spread: Spread,
     /// Tiles, of this tiling, that a comparison of drawings looks at; empty for all.
     pub mask: Vec<bool>,
     pub tiling: usize,
@@ -107,6 +107,8 @@ pub(crate) struct Lock {
     pub gain: f64,
     pub polarity: Polarity,
     pub blur: f64,
+    /// Standard deviation of the window about the optical axis in which the sheet is fitted, px of an 848 x 480 px picture.
+    pub focus: f64,
 }
 
 impl Workspace {
@@ -210,31 +212,26 @@ impl Workspace {
     }
 
     /// The last sums read as combs.
-    pub(crate) fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) {
+    pub(crate) fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) -> Comb {
         let width = self.scope.sides.map(|s| self.twine / s);
         let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
         let t = &mut self.tools;
         let comb = Comb::new(&t.sums, width, cell, odd, looks, &mut t.scratch);
         measure(surface, &self.view, place, Probe::Comb(comb), gain, &t.sums, &mut t.scratch, &mut t.measurements);
+        comb
     }
 
     /// What a fitted sheet that lies on the twine has for it: first by all harmonics together, then by the first two, whose measurements are left
     /// behind.
-    pub(crate) fn weigh(
-        &mut self,
-        surface: &Surface,
-        place: (usize, usize),
-        polarity: Polarity,
-        looks: Looks,
-    ) -> Evidence {
+    pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), lock: &Lock) -> Evidence {
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let sign = f64::from(polarity.sign());
-        self.comb(surface, place, sign, looks.map(|e| sign * e), gain);
-        let all = self.evidence();
+        let sign = f64::from(lock.polarity.sign());
+        self.comb(surface, place, sign, lock.seed.looks.map(|e| sign * e), gain);
+        let all = self.evidence_within(lock.focus);
         let t = &mut self.tools;
         let probe = Probe::Waves(sign);
         measure(surface, &self.view, place, probe, gain, &t.sums, &mut t.scratch, &mut t.measurements);
-        self.evidence().with_comb(&all)
+        self.evidence_within(lock.focus).with_comb(&all)
     }
 
     /// One lock-in by all harmonics together.
@@ -245,8 +242,13 @@ impl Workspace {
 
     /// What the last measurements say for the lattice.
     pub(crate) fn evidence(&mut self) -> Evidence {
-        let near = self.window(NEAR);
-        Evidence::new(&self.tools.measurements, near, &mut self.tools.scratch)
+        self.evidence_within(f64::INFINITY)
+    }
+
+    /// The same of those within a radius of the optical axis, px of an 848 x 480 px picture.
+    pub(crate) fn evidence_within(&mut self, radius: f64) -> Evidence {
+        let (near, window) = (self.window(NEAR), self.window(radius));
+        Evidence::new(&self.tools.measurements, near, window, &mut self.tools.scratch)
     }
 
     /// All cells on top of each other, where the last measurements found the lattice; those of `place` and this surface.
@@ -376,6 +378,7 @@ impl Workspace {
         let tiling = self.view.tiling_for(cell);
         self.high(level, cell);
         self.load_likelihood(level);
+        let focus = self.window(lock.focus);
         let drawing = Drawing { sparse, ..self.drawing(level, cell, lock.polarity, lock.blur) };
         let t = &mut self.tools;
         let view = &self.view.levels[level];
@@ -388,6 +391,10 @@ impl Workspace {
             t.scratch.extend(t.likelihood.shifts.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()));
             let scale = (3.0 * 1.4826 * crate::numeric::median(&mut t.scratch)).max(0.01);
             let robust = Robust::Tile(scale);
+            for o in &mut t.observations {
+                let w = focus.weight(o.site.pixel);
+                o.weight.iter_mut().for_each(|o| *o *= w);
+            }
             let done = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?;
             surface = done.surface;
             fit = Some((done, robust));
