@@ -1,28 +1,24 @@
 //! Two-dimensional discrete Fourier transform of a real image of any size.
 
-use std::sync::Arc;
-
 use net_image::View;
-use rustfft::algorithm::BluesteinsAlgorithm;
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 
 use crate::error::{Error, Result};
+use crate::line_fft::LineFft;
 
 /// Plans and scratch for images of one size. See the crate's manual for normalization and output order.
 ///
-/// Rows are transformed two at a time, as the real and the imaginary part of one: the halves of the picture, one on top of the other. After the transposition they are told apart
-/// column by column, by the symmetry of a real row's transform, and each column is transformed while it is at hand.
+/// Rows are transformed two at a time, as the real and the imaginary part of one: the halves of the picture, one on top of the other. They are told apart by the symmetry of a
+/// real row's transform, a few columns at a time, and each column is transformed while it is at hand.
 pub struct RealFft2 {
     width: usize,
     height: usize,
-    row_plan: Arc<dyn Fft<f32>>,
-    column_plan: Arc<dyn Fft<f32>>,
+    row_plan: LineFft,
+    column_plan: LineFft,
     /// Two rows of the image, in and out of the caller's hands.
     rows: [Vec<f32>; 2],
-    /// Pairs of rows transformed, pair by pair, and the same transposed.
+    /// Pairs of rows transformed, pair by pair.
     pairs: Vec<Complex32>,
-    turned: Vec<Complex32>,
     scratch: Vec<Complex32>,
 }
 
@@ -41,14 +37,13 @@ impl RealFft2 {
         if width == 0 || height == 0 {
             return Err(Error::EmptySize { width, height });
         }
-        let (row_plan, column_plan) = (plan(width), plan(height));
-        let scratch = row_plan.get_inplace_scratch_len().max(column_plan.get_inplace_scratch_len());
+        let (row_plan, column_plan) = (LineFft::new(width), LineFft::new(height));
+        let scratch = row_plan.scratch_len().max(column_plan.scratch_len());
         let pairs = vec![Complex32::default(); width * height.div_ceil(2)];
         Ok(Self {
             width,
             height,
             rows: [vec![0.0; width], vec![0.0; width]],
-            turned: pairs.clone(),
             pairs,
             scratch: vec![Complex32::default(); scratch],
             row_plan,
@@ -97,48 +92,34 @@ impl RealFft2 {
             for ((to, &re), &im) in pair.iter_mut().zip(&*upper).zip(&*lower) {
                 *to = Complex32::new(re, im);
             }
-            self.row_plan.process_with_scratch(pair, &mut self.scratch);
+            self.row_plan.process(pair, &mut self.scratch);
         }
-        transpose::transpose(&self.pairs, &mut self.turned, self.width, half);
-        for (kx, column) in out.data.chunks_exact_mut(self.height).enumerate() {
-            let mirrored = &self.turned[(self.width - kx) % self.width * half..][..half];
-            let both = self.turned[kx * half..][..half].iter().zip(mirrored);
-            let (upper, lower) = column.split_at_mut(half);
-            // Z = A + iB, and a real row's transform is its own mirror image, conjugated.
-            for (to, (z, m)) in upper.iter_mut().zip(both.clone()) {
-                *to = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
+        for (block, columns) in out.data.chunks_mut(BLOCK * self.height).enumerate() {
+            self.split_rows(block * BLOCK, columns);
+            for column in columns.chunks_exact_mut(self.height) {
+                self.column_plan.process(column, &mut self.scratch);
             }
-            for (to, (z, m)) in lower.iter_mut().zip(both) {
-                *to = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
+        }
+    }
+
+    /// Tells the transforms of paired rows apart, for bins `first` and on along the rows, into columns.
+    fn split_rows(&self, first: usize, columns: &mut [Complex32]) {
+        let half = self.height.div_ceil(2);
+        for (v, pair) in self.pairs.chunks_exact(self.width).enumerate() {
+            for (kx, column) in (first..).zip(columns.chunks_exact_mut(self.height)) {
+                // Z = A + iB, and a real row's transform is its own mirror image, conjugated.
+                let (z, m) = (pair[kx], pair[if kx == 0 { 0 } else { self.width - kx }]);
+                column[v] = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
+                if let Some(lower) = column.get_mut(v + half) {
+                    *lower = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
+                }
             }
-            self.column_plan.process_with_scratch(column, &mut self.scratch);
         }
     }
 }
 
-/// Largest prime factor for which the library has fast kernels.
-const LARGEST_FAST_PRIME: usize = 11;
-
-/// The plan for `length` points. One prime factor without a fast kernel (848 has 53) makes the library's own plan three times as slow as a convolution (Bluestein 1970) of
-/// twice the length, which can have any factors.
-fn plan(length: usize) -> Arc<dyn Fft<f32>> {
-    let mut planner = FftPlanner::new();
-    if without_factors_up_to(LARGEST_FAST_PRIME, length) == 1 {
-        return planner.plan_fft_forward(length);
-    }
-    let inner = (2 * length - 1..).find(|&n| without_factors_up_to(3, n) == 1).unwrap_or(length);
-    Arc::new(BluesteinsAlgorithm::new(length, planner.plan_fft_forward(inner)))
-}
-
-/// What is left of `number`, above 0, divided by all its factors up to `largest`.
-fn without_factors_up_to(largest: usize, mut number: usize) -> usize {
-    for factor in 2..=largest {
-        while number.is_multiple_of(factor) {
-            number /= factor;
-        }
-    }
-    number
-}
+/// Columns that are gathered together: as many as a cache line of a row holds.
+const BLOCK: usize = 8;
 
 /// Half of the transform of a real image; the other half is its complex conjugate. Reused between transforms.
 #[derive(Debug, Clone, Default)]
@@ -220,7 +201,23 @@ mod tests {
 
     #[test]
     fn equals_the_definition_for_even_odd_prime_and_tiny_sizes() {
-        for (width, height) in [(1, 1), (2, 1), (1, 5), (3, 2), (8, 6), (7, 11), (15, 10), (13, 17), (24, 9), (53, 4)] {
+        // 104, 424 and 776 have a prime factor that is multiplied out, 53 and 808 become convolutions.
+        for (width, height) in [
+            (1, 1),
+            (2, 1),
+            (1, 5),
+            (3, 2),
+            (8, 6),
+            (7, 11),
+            (15, 10),
+            (13, 17),
+            (24, 9),
+            (53, 4),
+            (104, 3),
+            (2, 424),
+            (776, 1),
+            (808, 1),
+        ] {
             let image = noise(width * height, (width * 100 + height) as u64);
             let mut out = HalfSpectrum::default();
             let mut plan = RealFft2::new(width, height).expect("a size above zero");

@@ -66,6 +66,7 @@ mod field;
 mod filter;
 mod fit;
 mod flatten;
+mod line_fft;
 mod measure;
 mod naming;
 mod peaks;
