@@ -11,6 +11,8 @@ pub struct Dbscan {
     neighbours: NearestPoints,
     /// Points of the cluster at hand whose neighbours are still to be visited.
     stack: Vec<u32>,
+    /// Neighbours of one of them.
+    near: Vec<usize>,
 }
 
 impl Dbscan {
@@ -28,33 +30,34 @@ impl Dbscan {
         min_points: usize,
         labels: &mut Vec<Option<u32>>,
     ) -> u32 {
-        let Self { neighbours, stack } = self;
+        let Self { neighbours, stack, near } = self;
         neighbours.fill(points);
         labels.clear();
         labels.resize(points.len(), None);
         let mut clusters = 0;
         for seed in 0..points.len() {
-            let near = |i: usize| neighbours.within(points[i], radius(i));
-            let is_core = |i: usize| near(i).take(min_points).count() == min_points;
-            if labels[seed].is_some() || !points[seed].x.is_finite() || !points[seed].y.is_finite() || !is_core(seed) {
+            if labels[seed].is_some() || !points[seed].x.is_finite() || !points[seed].y.is_finite() {
                 continue;
             }
-            labels[seed] = Some(clusters);
             stack.clear();
             stack.push(seed as u32);
             while let Some(i) = stack.pop() {
                 let i = i as usize;
-                if !is_core(i) {
+                near.clear();
+                near.extend(neighbours.within(points[i], radius(i)));
+                if near.len() < min_points {
                     continue;
                 }
-                for j in near(i) {
+                labels[i] = Some(clusters);
+                for &j in &*near {
                     if labels[j].is_none() {
                         labels[j] = Some(clusters);
                         stack.push(j as u32);
                     }
                 }
             }
-            clusters += 1;
+            // Only a core point has labelled itself.
+            clusters += u32::from(labels[seed].is_some());
         }
         clusters
     }

@@ -13,8 +13,11 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    /// Makes room for a picture of this size, frame all round.
+    /// Makes room for a picture of this size, frame all round. Pixels inside keep what they were.
     pub fn resize(&mut self, width: usize, height: usize) {
+        if (self.width, self.height) == (width, height) && !self.values.is_empty() {
+            return;
+        }
         self.width = width;
         self.height = height;
         self.values.clear();

@@ -39,23 +39,23 @@ pub(crate) fn parallelogram_corners(
 pub fn convex_hull(points: &mut [Vector2<f64>], hull: &mut Vec<Vector2<f64>>) {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     hull.clear();
-    let mut half = |ordered: &mut dyn Iterator<Item = &Vector2<f64>>| {
-        let base = hull.len();
-        for &p in ordered {
-            while hull.len() >= base + 2 {
-                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
-                if (b - a).perp(&(p - b)) > 0.0 {
-                    break;
-                }
-                hull.pop();
+    half_hull(points.iter(), hull);
+    half_hull(points.iter().rev(), hull);
+}
+
+/// Appends one side of the hull of ordered points, but for its last point, which begins the other side.
+fn half_hull<'a>(ordered: impl Iterator<Item = &'a Vector2<f64>>, hull: &mut Vec<Vector2<f64>>) {
+    let base = hull.len();
+    for &p in ordered {
+        while let [.., a, b] = hull[base..] {
+            if (b - a).perp(&(p - b)) > 0.0 {
+                break;
             }
-            hull.push(p);
+            hull.pop();
         }
-        // The last point begins the other half.
-        hull.pop();
-    };
-    half(&mut points.iter());
-    half(&mut points.iter().rev());
+        hull.push(p);
+    }
+    hull.pop();
 }
 
 /// The rectangle of least area around a convex polygon in the sense from u to v, by rotating calipers (Toussaint 1983):
@@ -65,7 +65,6 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
     if n < 3 {
         return None;
     }
-    let mut best: Option<Rectangle> = None;
     // Past the last corner comes the first; a remainder would cost more than the rest.
     let corner = |k: usize| {
         hull[if k < n {
@@ -76,38 +75,48 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
             k % n
         }]
     };
+    // The side's two ends, then the corners farthest along it, across it, and back along it: each of these only ever moves on.
+    let mut best = None;
     let mut least = f64::INFINITY;
-    // Calipers: the corners farthest along the side, across it, and back along it. Each only ever moves on.
     let (mut ahead, mut across, mut back) = (1, 1, 1);
     for (i, &here) in hull.iter().enumerate() {
-        let Some(t) = (corner(i + 1) - here).try_normalize(0.0) else { continue };
-        let normal = Vector2::new(-t.y, t.x);
+        // Not of unit length: lengths along and across it are so many times too long.
+        let side = corner(i + 1) - here;
+        let square = side.norm_squared();
+        if !(square > 0.0) {
+            continue;
+        }
+        let normal = Vector2::new(-side.y, side.x);
         let climb = |mut k: usize, direction: Vector2<f64>| {
+            let mut at = direction.dot(&corner(k));
             // At most one round: guards against a polygon that is not convex.
             for _ in 0..n {
-                if direction.dot(&(corner(k + 1) - corner(k))) <= 0.0 {
+                let next = direction.dot(&corner(k + 1));
+                if next <= at {
                     break;
                 }
-                k += 1;
+                (k, at) = (k + 1, next);
             }
-            k
+            (k, at)
         };
-        ahead = climb(ahead.max(i + 1), t);
-        across = climb(across.max(ahead), normal);
-        back = climb(back.max(across), -t);
-        let (low, high) = (t.dot(&corner(back)), t.dot(&corner(ahead)));
-        let (near, far) = (normal.dot(&here), normal.dot(&corner(across)));
-        let area = (high - low) * (far - near);
+        let (high, far, low);
+        (ahead, high) = climb(ahead.max(i + 1), side);
+        (across, far) = climb(across.max(ahead), normal);
+        (back, low) = climb(back.max(across), -side);
+        let (low, near) = (-low, normal.dot(&here));
+        let area = (high - low) * (far - near) / square;
         if area < least {
             least = area;
-            best = Some(Rectangle {
-                centre: t * (0.5 * (low + high)) + normal * (0.5 * (near + far)),
-                half1: t * (0.5 * (high - low)),
-                half2: normal * (0.5 * (far - near)),
-            });
+            best = Some((side / square, normal / square, [low, high, near, far]));
         }
     }
-    best.filter(|b| b.area() > 0.0 && b.area().is_finite())
+    let (side, normal, [low, high, near, far]) = best?;
+    let rectangle = Rectangle {
+        centre: side * (0.5 * (low + high)) + normal * (0.5 * (near + far)),
+        half1: side * (0.5 * (high - low)),
+        half2: normal * (0.5 * (far - near)),
+    };
+    Some(rectangle).filter(|b| b.area() > 0.0 && b.area().is_finite())
 }
 
 /// Half sides of the parallelogram of least area around a convex polygon, longer side's direction first as found, in the sense from

@@ -133,8 +133,7 @@ impl Shaper {
             let b2 = if basis.cell_area() > 0.0 { basis.b2 } else { -basis.b2 };
             return fit_quadrilateral(outline, basis.b1, b2);
         }
-        self.points.clear();
-        self.points.extend_from_slice(outline);
+        outward_turns(outline, &mut self.points);
         convex_hull(&mut self.points, &mut self.hull);
         match config.shape {
             Shape::Rectangle => {
@@ -145,6 +144,19 @@ impl Shaper {
                 fit_quadrilateral(outline, half1, half2)
             }
         }
+    }
+}
+
+/// The points of an outline where it does not turn inwards, into `points` (cleared first). It does not cross itself, so they have the same hull as all.
+fn outward_turns(outline: &[Vector2<f64>], points: &mut Vec<Vector2<f64>>) {
+    points.clear();
+    let &[.., before, here] = outline else { return };
+    let (mut before, mut here) = (before, here);
+    for &after in outline {
+        if (here - before).perp(&(after - here)) >= 0.0 {
+            points.push(here);
+        }
+        (before, here) = (here, after);
     }
 }
 
@@ -187,9 +199,11 @@ fn bounding_box(points: &[Vector2<f64>]) -> [Vector2<f64>; 4] {
 #[cfg(test)]
 mod tests {
     use net_geometry::Basis;
+    use proptest::prelude::*;
 
     use super::*;
-    use crate::contour::trace::polygon_area;
+    use crate::contour::level::Level;
+    use crate::contour::trace::{Tracer, polygon_area};
 
     fn outline_of(corners: [(f64, f64); 4]) -> Vec<Vector2<f64>> {
         let corners = corners.map(|(x, y)| Vector2::new(x, y));
@@ -239,5 +253,24 @@ mod tests {
         // A triangle fills half of its quadrilateral.
         let triangle = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (10.0, 10.0)];
         assert_ne!(judge(triangle, cell, &Config::default()), Verdict::Accepted);
+    }
+
+    proptest! {
+        #[test]
+        fn the_outward_turns_of_any_outline_have_its_hull(
+            width in 1_usize..20,
+            // Zeros are many: there several points of an outline fall on one pixel.
+            levels in prop::collection::vec(-3_i16..3, 20 * 16),
+        ) {
+            let level = Level::from_fn(width, 16, |u, v| levels[v * width + u]);
+            let (mut points, mut hull, mut all) = (Vec::new(), Vec::new(), Vec::new());
+            Tracer::default().trace(&level, usize::MAX, |outline| {
+                outward_turns(outline.points, &mut points);
+                convex_hull(&mut points, &mut hull);
+                convex_hull(&mut outline.points.to_vec(), &mut all);
+                // Rounding of coordinates below 20 px.
+                assert!((polygon_area(&hull) - polygon_area(&all)).abs() < 1e-9, "{hull:?} is not {all:?}");
+            });
+        }
     }
 }
