@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 /// How often a plain line is printed.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -24,11 +24,15 @@ impl Progress {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = total.map_or_else(ProgressBar::no_length, ProgressBar::new);
             let template = if total.is_some() {
-                "{bar:30} {pos}/{len} frames, {per_sec}, {eta} left  {msg}"
+                "{bar:30} {pos}/{len} frames, {rate}, {eta} left  {msg}"
             } else {
-                "{spinner} {pos} frames, {per_sec}  {msg}"
+                "{spinner} {pos} frames, {rate}  {msg}"
             };
-            bar.with_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()))
+            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+            // Four digits behind the point is what the library would print.
+            bar.with_style(style.with_key("rate", |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+                let _ = write!(to, "{:.1}/s", state.per_sec());
+            }))
         });
         let now = Instant::now();
         Self { bar, total, done: 0, start: now, last_line: now }

@@ -122,13 +122,17 @@ impl RunSummary {
     }
 }
 
-/// Writes a file beside `path`, then puts it in its place.
+/// Writes a file beside `path`, then puts it in its place. Where that fails (a full disk), `path` stays as it was, and nothing beside it.
 pub(crate) fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".new");
     let temporary = path.with_file_name(name);
-    write(&temporary)?;
-    std::fs::rename(&temporary, path).map_err(Error::io("write", path))
+    let done = write(&temporary).and_then(|()| std::fs::rename(&temporary, path).map_err(Error::io("write", path)));
+    if done.is_err() {
+        // It may never have been there; the first error is the one to tell.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    done
 }
 
 /// Collects times in bounded memory: a histogram whose steps are 2 % wide, from 1 µs to about 3 hours.
