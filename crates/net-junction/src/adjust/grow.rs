@@ -144,9 +144,7 @@ impl Grower {
             self.sample(source, graph, k, steps, &none, look);
         }
         self.settle_signs(graph, steps);
-        self.strongest.clear();
-        self.strongest.extend(self.strengths.iter().filter(|&&s| s > 0.0));
-        let least = ORIGIN_PART * upper(&mut self.strongest).unwrap_or(0.0);
+        let least = self.least_strength();
         let stands_out = |t: &&Twine| self.strengths[graph.blocks.of_edge(t.edge as usize)] >= least;
         let away = |t: &&Twine| (t.from - seed).norm_squared();
         let near = self.twines.iter().filter(stands_out).min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -154,6 +152,13 @@ impl Grower {
         self.twines.iter_mut().for_each(|t| t.warped = f64::NAN);
         self.responses.fill(0.0);
         origin
+    }
+
+    /// What blocks have in common where there is net, at least.
+    fn least_strength(&mut self) -> f32 {
+        self.strongest.clear();
+        self.strongest.extend(self.strengths.iter().filter(|&&s| s > 0.0));
+        ORIGIN_PART * upper(&mut self.strongest).unwrap_or(0.0)
     }
 
     /// Offsets on each side.
@@ -218,12 +223,14 @@ impl Grower {
     /// Where the sampled twines lie.
     fn pick(&mut self, graph: &Graph, steps: usize) {
         self.settle_signs(graph, steps);
+        let least = self.least_strength();
         let places = 2 * steps + 1;
-        let Self { twines, responses, strongest, signs, picked, measured, .. } = self;
+        let Self { twines, responses, strongest, signs, strengths, picked, measured, .. } = self;
         picked.clear();
         strongest.clear();
         for (twine, row) in twines.iter().zip(responses.chunks_exact(places)) {
-            let sign = signs[graph.blocks.of_edge(twine.edge as usize)];
+            let block = graph.blocks.of_edge(twine.edge as usize);
+            let sign = signs[block];
             let mut best = (0, 0.0_f32);
             for (k, a) in row.iter().enumerate() {
                 let q = (k as f32 - steps as f32) * COARSE_PX as f32;
@@ -236,7 +243,8 @@ impl Grower {
             let q = (k as f32 - steps as f32 + vertex([k - 1, k, k + 1].map(|k| row[k] * sign))) * COARSE_PX as f32;
             let good = !twine.warped.is_nan() && best.1 > 0.0 && q.abs() < 0.98 * twine.reach;
             picked.push((f64::from(q), if good { row[best.0].abs() } else { 0.0 }));
-            if good {
+            // Water beyond the net's end must not say what is usual.
+            if good && strengths[block] >= least {
                 strongest.push(row[best.0].abs());
             }
         }
