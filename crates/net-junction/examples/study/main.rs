@@ -86,7 +86,7 @@ impl Kind {
         let found = score(&adjuster, sample, &map, config.cell_min_px, false);
         let nodes = found.in_view;
         if let Some(folder) = &options.overlays {
-            overlay::draw(folder, sample, &adjuster)?;
+            overlay::draw(folder, sample, &adjuster, "")?;
         }
         eprintln!("{:<28} {found} {milliseconds:.1} ms", sample.name);
         self.truly.add(found);
@@ -102,6 +102,17 @@ impl Kind {
                 Some(estimate) => {
                     adjuster.adjust(view, &EstimatedMap { estimate: &estimate, camera: &sample.camera })?;
                     let found = score(&adjuster, sample, &map, config.cell_min_px, true);
+                    if let Some(folder) = &options.overlays {
+                        overlay::draw(folder, sample, &adjuster, "_estimated")?;
+                        let name: String =
+                            sample.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+                        score::dump(
+                            &folder.join(format!("{name}.txt")),
+                            &adjuster,
+                            sample,
+                            &EstimatedMap { estimate: &estimate, camera: &sample.camera },
+                        );
+                    }
                     eprintln!("{:<28} {found} from an estimate", "");
                     self.estimated.add(found);
                 }

@@ -24,7 +24,7 @@ fn line(canvas: &mut RgbImage, a: Vector2<f64>, b: Vector2<f64>, colour: [u8; 3]
     }
 }
 
-pub fn draw(folder: &Path, sample: &Sample, adjuster: &NetAdjuster) -> Result<()> {
+pub fn draw(folder: &Path, sample: &Sample, adjuster: &NetAdjuster, suffix: &str) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     let (width, height) = (sample.image.width() as u32, sample.image.height() as u32);
     let scale = SCALE as u32;
@@ -64,6 +64,6 @@ pub fn draw(folder: &Path, sample: &Sample, adjuster: &NetAdjuster) -> Result<()
         }
     }
     let name: String = sample.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-    canvas.save(folder.join(format!("{name}.png")))?;
+    canvas.save(folder.join(format!("{name}{suffix}.png")))?;
     Ok(())
 }

@@ -100,7 +100,7 @@ impl NetAdjuster {
         if graph.edges.is_empty() {
             return Ok(&self.junctions);
         }
-        // 1. Outward from the seed: what the prediction misses smoothly. Once more if the camera moved.
+        // 1. How the camera moved, and outward from the seed what the prediction misses smoothly.
         let mut look = Look {
             twine_m: config.twines_m[config.twines_m.len() / 2],
             blur_px: [0.0; 2],
@@ -108,20 +108,11 @@ impl NetAdjuster {
         };
         let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
         let diagonal = (width as f64).hypot(height as f64);
-        for moving in [false, true] {
-            let warp = grower.grow(source, graph, seed, diagonal, &look, config);
-            graph.build(&Warped { map, warp: &warp }, width, height, least);
-            if graph.edges.is_empty() {
-                return Ok(&self.junctions);
-            }
-            if moving {
-                break;
-            }
-            look.blur_px = locator.fit_blur(source, graph, profiles, cell, &look, config);
-            if look.blur_px == [0.0; 2] {
-                break;
-            }
-            graph.build(map, width, height, least);
+        look.blur_px = locator.fit_blur(source, graph, profiles, cell, &look, config);
+        let warp = grower.grow(source, graph, seed, diagonal, &look, config);
+        graph.build(&Warped { map, warp: &warp }, width, height, least);
+        if graph.edges.is_empty() {
+            return Ok(&self.junctions);
         }
         // 2. All nodes in view, from wide to narrow search on the same profiles.
         let (last, wider) = config.search_cells.split_last().unwrap_or((&0.12, &[]));

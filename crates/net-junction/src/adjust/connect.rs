@@ -15,11 +15,15 @@ use crate::adjust::seen::Witnesses;
 /// How much the displacements of a twine's ends may differ, cells: on twine that is seen, and across what is not.
 const SEEN_CELLS: f64 = 0.25;
 const UNSEEN_CELLS: f64 = 0.1;
+/// Steps in a row that may lead across what is not seen: a prediction that drifts off is a cell off after more of them.
+const UNSEEN_STEPS: u8 = 3;
 
 /// Buffers of this stage.
 #[derive(Debug, Default)]
 pub(crate) struct Connector {
     reached: Vec<bool>,
+    /// By node: steps since something was seen.
+    blind: Vec<u8>,
     queue: VecDeque<u32>,
 }
 
@@ -33,6 +37,8 @@ impl Connector {
     pub fn walk(&mut self, graph: &Graph, twines: &[Twine], witnesses: &Witnesses) {
         self.reached.clear();
         self.reached.resize(graph.nodes.len(), false);
+        self.blind.clear();
+        self.blind.resize(graph.nodes.len(), u8::MAX);
         self.queue.clear();
         let Some(seed) = graph.nodes.first().map(|n| n.predicted) else { return };
         let distance = |n: u32| (graph.nodes[n as usize].predicted - seed).norm_squared();
@@ -40,6 +46,7 @@ impl Connector {
         let nearest = seen.min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
         let Some(start) = nearest else { return };
         self.reached[start as usize] = true;
+        self.blind[start as usize] = 0;
         self.queue.push_back(start);
         while let Some(node) = self.queue.pop_front() {
             let (i, j) = graph.nodes[node as usize].index;
@@ -51,8 +58,10 @@ impl Connector {
                 let seen = twines[edge].state == TwineState::Present
                     || witnesses.saw(node as usize) && witnesses.saw(other as usize);
                 let allowed = if seen { SEEN_CELLS } else { UNSEEN_CELLS };
-                if !self.reached[other as usize] && apart(graph, a, b) < allowed {
+                let blind = if seen { 0 } else { self.blind[node as usize] + 1 };
+                if blind <= UNSEEN_STEPS && blind < self.blind[other as usize] && apart(graph, a, b) < allowed {
                     self.reached[other as usize] = true;
+                    self.blind[other as usize] = blind;
                     self.queue.push_back(other);
                 }
             }

@@ -8,7 +8,7 @@ use crate::adjust::locate::{kernel_for, reach_px, sign, vertex};
 use crate::adjust::map::LatticeMap;
 use crate::adjust::profile::{COARSE_PX, Source};
 use crate::adjust::template::{Kernels, Look};
-use crate::adjust::warp::{Measured, Warp, radii};
+use crate::adjust::warp::{FIRST_RADIUS, Measured, Warp, radii};
 
 /// Most twines that are measured.
 const TWINES: usize = 1500;
@@ -18,12 +18,16 @@ const AMPLITUDE_PARTS: (f32, f32) = (0.35, 3.0);
 const NEAR_CELLS: f64 = 0.12;
 /// By how much more twines must speak for a warp than for none: one that leads astray finds twine, too, if a neighbouring one.
 const BETTER: f64 = 1.15;
+/// Part of the twines that do not speak for the prediction which may not speak for a right warp either.
+const LEFT: f64 = 0.5;
 /// Where no twine would move farther than this, cells, there is nothing to compare.
 const SMALL_CELLS: f64 = 0.1;
 
 /// Growth begins where every third twine of the list shows half of what is seen where the net is.
 const ORIGIN_STRIDE: usize = 3;
 const ORIGIN_PART: f32 = 0.5;
+/// Where growth begins the prediction is right to this, cells: a warp that moves it farther there has taken the gaps for blurred twine.
+const ORIGIN_CELLS: f64 = 0.25;
 /// Fewer twines than that have too much in common by chance.
 const ORIGIN_FEWEST: f32 = 6.0;
 
@@ -89,6 +93,15 @@ impl Grower {
             warp.fit(&self.measured, 1 + round.div_ceil(2));
         }
         let moves = |t: &Twine| t.normal.dot(&warp.at(t.from)).abs() / cell_of(graph, t);
+        let at_origin = |t: &&Twine| t.radius < FIRST_RADIUS.1 * cell && !t.warped.is_nan();
+        if self
+            .twines
+            .iter()
+            .filter(at_origin)
+            .any(|t| t.normal.dot(&warp.at(seed)).abs() > ORIGIN_CELLS * cell_of(graph, t))
+        {
+            return Warp::none(seed);
+        }
         if self.twines.iter().filter(|t| !t.warped.is_nan()).any(|t| moves(t) > SMALL_CELLS) {
             let none = Warp::none(seed);
             let [without, with] = [&none, &warp].map(|w| {
@@ -97,9 +110,10 @@ impl Grower {
                 }
                 self.pick(graph, steps);
                 let near = |m: &&Measured| (m.across - m.normal.dot(&w.at(m.from))).abs() < NEAR_CELLS * m.cell;
-                self.measured.iter().filter(near).count()
+                let near = self.measured.iter().filter(near).count();
+                (near as f64, (self.measured.len() - near) as f64)
             });
-            if (with as f64) < BETTER * without as f64 {
+            if with.0 < BETTER * without.0 || with.1 > LEFT * without.1 {
                 return none;
             }
         }

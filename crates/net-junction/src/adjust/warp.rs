@@ -23,7 +23,7 @@ const ROUNDS: usize = 4;
 const FIT_TWINES: usize = 400;
 
 /// First radius of growth, px, at least and in cells, and the factor from one to the next.
-const FIRST_RADIUS: (f64, f64) = (60.0, 5.0);
+pub(crate) const FIRST_RADIUS: (f64, f64) = (60.0, 5.0);
 const GROWTH: f64 = 1.4;
 
 /// Displacement of the prediction, a polynomial of the predicted pixel.
