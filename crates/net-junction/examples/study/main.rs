@@ -104,14 +104,6 @@ impl Kind {
                     let found = score(&adjuster, sample, &map, config.cell_min_px, true);
                     if let Some(folder) = &options.overlays {
                         overlay::draw(folder, sample, &adjuster, "_estimated")?;
-                        let name: String =
-                            sample.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-                        score::dump(
-                            &folder.join(format!("{name}.txt")),
-                            &adjuster,
-                            sample,
-                            &EstimatedMap { estimate: &estimate, camera: &sample.camera },
-                        );
                     }
                     eprintln!("{:<28} {found} from an estimate", "");
                     self.estimated.add(found);

@@ -259,28 +259,3 @@ fn is_certain(hole: &[Missing]) -> bool {
     hole.iter().any(|(_, (llr, contrast))| *llr < -5.0 && *contrast > 4.5)
         || hole.iter().map(|(_, (llr, _))| llr).sum::<f32>() < -13.0 && several >= 3
 }
-
-pub fn dump(path: &std::path::Path, adjuster: &NetAdjuster, sample: &Sample, map: &impl LatticeMap) {
-    let naming = naming(adjuster, sample);
-    let found: BTreeMap<_, _> =
-        adjuster.junctions().iter().filter_map(|j| Some((renamed(&naming, j.index?), j))).collect();
-    let mut text = String::new();
-    let back = |t: Index| -> Index {
-        let (x, y) = (t.0 - naming.1.0, t.1 - naming.1.1);
-        let m = naming.0;
-        let det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-        ((m[1][1] * x - m[0][1] * y) * det, (m[0][0] * y - m[1][0] * x) * det)
-    };
-    for k in &sample.knots {
-        let b = back(k.index);
-        let Some(p) = map.pixel(f64::from(b.0), f64::from(b.1)) else { continue };
-        let cell = cell_px(map, b).unwrap_or(f64::NAN);
-        let j = found.get(&k.index);
-        let (s, q) = j.map_or((9, Vector2::repeat(f64::NAN)), |j| (j.state as i32, j.pixel));
-        text += &format!(
-            "{} {} {} {} {} {} {} {} {} {} {}\n",
-            k.index.0, k.index.1, k.pixel.x, k.pixel.y, p.x, p.y, cell, s, q.x, q.y, k.visible as i32
-        );
-    }
-    std::fs::write(path, text).unwrap();
-}

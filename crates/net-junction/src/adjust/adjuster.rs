@@ -3,7 +3,6 @@ use net_geometry::{Junction, JunctionState};
 use net_image::GrayView;
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::connect::Connector;
 use crate::adjust::graph::{Graph, median};
 use crate::adjust::grow::{Grower, Warped};
 use crate::adjust::locate::Locator;
@@ -12,6 +11,7 @@ use crate::adjust::presence::{Presence, Twine, TwineState};
 use crate::adjust::profile::{COARSE_PX, FINE_PX, Profiles, Source};
 use crate::adjust::seen::{Witnesses, own_twines};
 use crate::adjust::solve::Solver;
+use crate::adjust::spread::{Led, Spreader};
 use crate::adjust::template::Look;
 use crate::error::{Error, Result};
 
@@ -22,6 +22,11 @@ const SIGMA_MIN_PX: f64 = 0.03;
 const SHADING: f64 = 0.12;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
 const ROUNDS: [usize; 2] = [4, 3];
+/// How often knots may lead to another prediction, and how many of them must be elsewhere than it says.
+const LED: usize = 2;
+const LED_FEWEST: usize = 4;
+/// Contrast of twine that may lead to other twine.
+const LED_CONTRAST: f32 = 1.0;
 
 /// Adjusts a predicted lattice to a picture, node by node. Owns all buffers: after the first pictures no memory is allocated.
 #[derive(Debug)]
@@ -32,12 +37,12 @@ pub struct NetAdjuster {
     source: Source,
     graph: Graph,
     grower: Grower,
+    spreader: Spreader,
     profiles: Profiles,
     locator: Locator,
     solver: Solver,
     presence: Presence,
     witnesses: Witnesses,
-    connector: Connector,
     values: Vec<f32>,
     junctions: Vec<Junction>,
     twine_m: f64,
@@ -62,12 +67,12 @@ impl NetAdjuster {
             height,
             source: Source::default(),
             grower: Grower::default(),
+            spreader: Spreader::default(),
             profiles: Profiles::default(),
             locator: Locator::default(),
             solver: Solver::default(),
             presence: Presence::default(),
             witnesses: Witnesses::default(),
-            connector: Connector::default(),
             values: Vec::new(),
             junctions: Vec::new(),
             twine_m: f64::NAN,
@@ -93,7 +98,7 @@ impl NetAdjuster {
         self.twine_m = f64::NAN;
         let seed = map.seed().and_then(|(i, j)| map.pixel(f64::from(i), f64::from(j)));
         let Some(seed) = seed.filter(|p| p.x.is_finite() && p.y.is_finite()) else { return Ok(&self.junctions) };
-        let Self { config, source, graph, grower, profiles, locator, solver, presence, .. } = self;
+        let Self { config, source, graph, grower, profiles, locator, .. } = self;
         let (width, height, least) = (self.width, self.height, config.cell_min_px);
         source.load(image);
         graph.build(map, width, height, least);
@@ -114,10 +119,38 @@ impl NetAdjuster {
         if graph.edges.is_empty() {
             return Ok(&self.junctions);
         }
-        // 2. All nodes in view, from wide to narrow search on the same profiles.
+        // 2. All nodes, and once more from where the knots that hold lead if that is elsewhere.
+        let map = Warped { map, warp: &warp };
+        for pass in 0..=LED {
+            self.measure(image, &mut look);
+            let Self { config, source, graph, spreader, witnesses, presence, .. } = self;
+            let strong = |n: usize| {
+                let own = own_twines(graph, n).into_iter().flatten().flatten();
+                own.map(|e| presence.twines[e].contrast).any(|c| c > LED_CONTRAST)
+            };
+            let moved = spreader.spread(source, graph, &map, |n| witnesses.saw(n), strong, &look, config);
+            if moved < LED_FEWEST || pass == LED {
+                break;
+            }
+            spreader.settle(graph);
+            graph.build(&Led { map: &map, spreader }, width, height, least);
+            if graph.edges.is_empty() {
+                return Ok(&self.junctions);
+            }
+        }
+        self.twine_m = look.twine_m;
+        self.leave_out_unnamed();
+        self.report();
+        Ok(&self.junctions)
+    }
+
+    /// Measures the nodes of the graph, and judges what is there.
+    fn measure(&mut self, image: GrayView, look: &mut Look) {
+        let Self { config, source, graph, profiles, locator, solver, presence, .. } = self;
+        // 1. From wide to narrow search on the same profiles.
         let (last, wider) = config.search_cells.split_last().unwrap_or((&0.12, &[]));
         if let Some(&widest) = wider.first() {
-            locator.look(source, graph, &look, widest, COARSE_PX);
+            locator.look(source, graph, look, widest, COARSE_PX);
             solver.start(graph, &locator.profiles.along, config);
             for (pass, &search) in wider.iter().enumerate() {
                 locator.reach(graph, search);
@@ -127,15 +160,14 @@ impl NetAdjuster {
             solver.commit(graph);
         }
         let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
-        look.twine_m = locator.fit_twine(source, graph, profiles, cell, &look, config);
-        // 3. Along the bent twines, with their own width.
-        locator.look(source, graph, &look, *last, FINE_PX);
+        look.twine_m = locator.fit_twine(source, graph, profiles, cell, look, config);
+        // 2. Along the bent twines, with their own width.
+        locator.look(source, graph, look, *last, FINE_PX);
         solver.start(graph, &locator.profiles.along, config);
         locator.pick(graph, None);
         solver.solve(graph, &locator.offsets, &locator.weights, ROUNDS[0]);
         solver.commit(graph);
-        self.twine_m = look.twine_m;
-        // 4. What is really there.
+        // 3. What is really there.
         let width = median_of(&mut self.values, graph.nodes.iter().map(|n| n.scale * look.twine_m));
         let window = [0, 1].map(|family| look.window_px(width, cell, family));
         let half = (window[0].max(window[1]) / FINE_PX).round() as usize;
@@ -144,11 +176,7 @@ impl NetAdjuster {
         let blur = look.blur_px[0].max(look.blur_px[1]);
         let beside = ((0.6 * width + 0.5).max(1.0) + 0.5 * blur) / FINE_PX;
         presence.judge(graph, &locator.profiles, source, image, half, beside.round() as usize, config);
-        // 5. As far as names can be trusted.
         self.witnesses.judge(graph, &presence.twines, &presence.votes, config);
-        self.connector.walk(&self.graph, &self.presence.twines, &self.witnesses);
-        self.report();
-        Ok(&self.junctions)
     }
 
     /// The junctions of the last picture.
@@ -166,9 +194,18 @@ impl NetAdjuster {
         self.twine_m
     }
 
+    /// Nothing is said of twines whose ends have no name.
+    fn leave_out_unnamed(&mut self) {
+        for (twine, edge) in self.presence.twines.iter_mut().zip(&self.graph.edges) {
+            if !edge.nodes.iter().all(|&n| self.spreader.named(n as usize)) {
+                (twine.state, twine.llr, twine.contrast) = (TwineState::Unknown, 0.0, 0.0);
+            }
+        }
+    }
+
     fn report(&mut self) {
         for (k, node) in self.graph.nodes.iter().enumerate() {
-            if !self.connector.reached(k) || !node.inside {
+            if !self.spreader.named(k) || !node.inside {
                 continue;
             }
             let twines = own_twines(&self.graph, k).map(|edges| edges.map(|e| Some(self.presence.twines[e?])));
