@@ -22,9 +22,10 @@ const SIGMA_MIN_PX: f64 = 0.03;
 const SHADING: f64 = 0.12;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
 const ROUNDS: [usize; 2] = [4, 3];
-/// How often knots may lead to another prediction, and how many of them must be elsewhere than it says.
+/// How often knots may lead to another prediction, and how many of them, and which part of all, must be elsewhere than it says.
 const LED: usize = 2;
 const LED_FEWEST: usize = 4;
+const LED_PART: usize = 100;
 /// Contrast of twine that may lead to other twine.
 const LED_CONTRAST: f32 = 1.0;
 
@@ -129,7 +130,7 @@ impl NetAdjuster {
                 own.map(|e| presence.twines[e].contrast).any(|c| c > LED_CONTRAST)
             };
             let moved = spreader.spread(source, graph, &map, |n| witnesses.saw(n), strong, &look, config);
-            if moved < LED_FEWEST || pass == LED {
+            if moved < LED_FEWEST.max(graph.nodes.len() / LED_PART) || pass == LED {
                 break;
             }
             spreader.settle(graph);

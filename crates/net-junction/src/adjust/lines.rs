@@ -65,13 +65,16 @@ pub(crate) struct Lines {
     pub whole: Statistic,
     pub weakest: Statistic,
     pub structure: Vec<f32>,
+    /// Mean grey level there.
+    pub level: Vec<f32>,
     row: Vec<f32>,
 }
 
 impl Lines {
     /// Amplitude of each line in parts of its template's, at the best common shift. `means` are those of the profiles.
     pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
-        for values in [&mut self.full.values, &mut self.whole.values, &mut self.weakest.values, &mut self.structure] {
+        let Self { full, whole, weakest, structure, level, .. } = self;
+        for values in [&mut full.values, &mut whole.values, &mut weakest.values, structure, level] {
             values.clear();
             values.resize(graph.edges.len(), f32::NAN);
         }
@@ -99,14 +102,16 @@ impl Lines {
                 }
             }
             self.weakest.values[e] = weakest.0 / window as f32;
-            let mut structure = 0.0;
+            let (mut structure, mut level) = (0.0, 0.0);
             for b in weakest.1..weakest.1 + window {
                 self.row.clear();
                 self.row.extend_from_slice(&profiles.row(e, b)[first + SHIFT..][..width]);
+                level += self.row.iter().sum::<f32>();
                 remove_line(&mut self.row);
                 structure += (self.row.iter().map(|r| r * r).sum::<f32>() / width as f32).sqrt();
             }
             self.structure[e] = structure / window as f32;
+            self.level[e] = level / (window * width) as f32;
         }
     }
 }

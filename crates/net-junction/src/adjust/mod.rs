@@ -5,6 +5,7 @@ mod appearance;
 mod blocks;
 mod config;
 mod covered;
+mod foreign;
 mod graph;
 mod grow;
 mod lines;

@@ -5,6 +5,7 @@ use net_image::GrayView;
 use crate::adjust::appearance::Appearance;
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::covered::Covered;
+use crate::adjust::foreign::Foreign;
 use crate::adjust::graph::Graph;
 use crate::adjust::lines::{Lines, Means, SHIFT};
 use crate::adjust::outside::Outside;
@@ -17,6 +18,8 @@ const SCATTER_MIN: (f32, f32) = (0.06, 0.07);
 const HIDDEN: f32 = 4.0;
 /// Structure beside a weak twine, in parts of the control lines', beyond which it is growth and no gap.
 const CLUTTER: f32 = 1.5;
+/// A weak twine whose level is this many deviations off that of the meshes beside it is overgrown: in a gap one sees the same water.
+const FOREIGN: f32 = 4.0;
 /// Larger cells, px, may have more of it: stubs that hang from the knots are larger, and what lies before the net stands out better.
 const CLUTTER_CELL_PX: f32 = 9.0;
 
@@ -62,6 +65,7 @@ pub(crate) struct Presence {
     control_structure: Vec<f32>,
     scratch: Vec<f32>,
     covered: Covered,
+    foreign: Foreign,
     outside: Outside,
     /// By edge: log likelihood ratio, net to no net, of the whole twine by normal densities, limited; NaN outside the picture.
     pub votes: Vec<f32>,
@@ -91,6 +95,7 @@ impl Presence {
         self.control_means.take(&self.control_profiles, half);
         self.control.reduce(graph, &self.control_profiles, &self.control_means, &self.appearance);
         self.covered.find(graph, image);
+        self.foreign.find(graph, &self.twine.level, &self.control.level);
         self.decide(graph, config);
         self.outside.mark(graph, &mut self.twines);
     }
@@ -140,6 +145,8 @@ impl Presence {
                 _ if !told && covered <= HIDDEN => TwineState::Unknown,
                 _ if covered > HIDDEN => TwineState::Hidden,
                 l if l < config.missing_llr && clutter > too_much => TwineState::Fouled,
+                // In a gap one sees what lies beside it.
+                l if l < config.missing_llr && self.foreign.at(e) > FOREIGN => TwineState::Fouled,
                 // What hides a mesh may hide a twine at its corner.
                 l if l < config.missing_llr && near > HIDDEN => TwineState::Hidden,
                 l if l < config.missing_llr => TwineState::Missing,

@@ -22,6 +22,8 @@ const FEWEST_TO_FIND: u32 = 5;
 const ROUGHNESS: f64 = 0.2;
 /// A knot farther from where its neighbours lead than this, cells, is another one.
 const ALIKE_CELLS: f64 = 0.15;
+/// What is not seen may be farther off: in a hole nothing holds it.
+const UNSEEN_CELLS: f64 = 0.25;
 /// So is one that is found farther off.
 const FOUND_CELLS: f64 = 0.4;
 /// Difference of neighbours' displacements, cells, that no net has.
@@ -126,7 +128,7 @@ impl Spreader {
                 let Some(off) = self.find(source, graph, k, led, slope, look, config) else { continue };
                 self.knots[k].shift = led + off;
                 self.knots[k].leads = true;
-                self.named[k] = seen(k) && near(led + off);
+                self.named[k] = near(led + off);
                 moved += usize::from((led + off - believed).norm() > MOVED_CELLS * node.height);
             }
             self.knots[k].known = true;
@@ -146,7 +148,7 @@ impl Spreader {
                     && !self.knots[k].known
                     && borders(graph, k, |n| self.knots[n].known)
                     && let Some((led, ..)) = self.lead(graph, k)
-                    && (self.knots[k].believed - led).norm() < ALIKE_CELLS * node.height
+                    && (self.knots[k].believed - led).norm() < UNSEEN_CELLS * node.height
                 {
                     self.found.push((k as u32, led));
                 }
