@@ -178,7 +178,7 @@ impl Evidence {
         let bend_deg = self.bend.to_degrees();
         let (whole, near) = (self.comb_good.min(0.8), self.comb_near.min(0.8));
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
-        let there = logistic(-8.2 + second + 7.5 * whole + 2.5 * near - 4.0 * self.dissent - 8.0 * unsettled);
+        let there = logistic(-8.2 + second + 7.5 * whole + 2.5 * near - 8.0 * self.dissent - 8.0 * unsettled);
         let twine = logistic((self.separable - 0.82) / 0.02);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
         let limit = (0.01 + 0.2 * self.balance).min(0.05 + 1.2 / self.cell_snr.max(1e-6)).min(0.1);
