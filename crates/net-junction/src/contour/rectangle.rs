@@ -83,7 +83,8 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
         // Not of unit length: lengths along and across it are so many times too long.
         let side = corner(i + 1) - here;
         let square = side.norm_squared();
-        if !(square > 0.0) {
+        // Two corners in one place, or no numbers at all.
+        if square.is_nan() || square <= 0.0 {
             continue;
         }
         let normal = Vector2::new(-side.y, side.x);
