@@ -3,7 +3,8 @@
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
 use crate::numeric::median;
-use crate::search::{Candidate, NOTHING, Scope, Search, fine_score};
+use crate::refine::fine_score;
+use crate::search::{Candidate, NOTHING, Scope, Search};
 use crate::spectra::Bank;
 
 /// Median and spread of such scores by depth.

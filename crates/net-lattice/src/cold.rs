@@ -10,7 +10,7 @@ use crate::fit::{Observation, Robust};
 use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
-use crate::search;
+use crate::refine;
 use crate::seed::Seed;
 use crate::stages::Stages;
 use crate::surface::Surface;
@@ -107,23 +107,23 @@ impl Workspace {
             found.clear();
             search.run(bank, &self.scope, 3, found);
             let scale = self.view.levels[bank.level].scale;
-            found.iter_mut().for_each(|c| *c = search::refine(bank, scale, &self.scope, c, search::ROUGHLY));
+            found.iter_mut().for_each(|c| *c = refine::refine(bank, scale, &self.scope, c, refine::ROUGHLY));
             let range = search.depths_m(self.scope.sides[0]);
-            search::add_rivals(bank, scale, &self.scope, range, found);
+            refine::add_rivals(bank, scale, &self.scope, range, found);
             self.background.measure(search, bank, scale, &self.scope);
             for c in found.iter_mut() {
                 c.above = self.background.above(c);
             }
-            search::distinct(found);
-            search::interleave(found);
+            refine::distinct(found);
+            refine::interleave(found);
             for c in found.iter_mut().take(REFINED) {
-                *c = search::refine(bank, scale, &self.scope, c, search::FINELY);
+                *c = refine::refine(bank, scale, &self.scope, c, refine::FINELY);
                 c.above = self.background.above(c);
             }
             refined.append(found);
         }
-        search::distinct(refined);
-        search::interleave(refined);
+        refine::distinct(refined);
+        refine::interleave(refined);
     }
 
     /// Between lattices that are there beyond doubt, two nets or periods of one, the drawing's gain decides. What a fish or a shadow is explained by counts

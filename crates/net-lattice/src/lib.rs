@@ -65,6 +65,7 @@ mod nodes;
 mod numeric;
 mod paint;
 mod periods;
+mod refine;
 mod search;
 mod seed;
 mod smooth;
