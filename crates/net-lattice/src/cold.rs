@@ -32,7 +32,6 @@ const FOLLOWED: f64 = 0.9;
 /// Candidates of the search that are locked to: at least the first number, more while none is coherent.
 const CANDIDATES: (usize, usize) = (3, 8);
 
-/// Tilt from which a lock-in is tried again, rad.
 /// Coherence of both families that leaves no doubt. Forty tiles in perfect step have 8.9.
 const SURE: f64 = 5.5;
 /// Share of a candidate's score below which another is nothing beside it.
@@ -43,6 +42,7 @@ const OUTWARDS: usize = 3;
 const REFINED: usize = 16;
 /// Candidates that are looked through for a second net.
 const MOST: usize = 12;
+/// Turn of the tilts about the one found from which a lock-in is tried again, rad.
 const OTHER: f64 = 0.16;
 
 impl Workspace {

@@ -94,6 +94,7 @@ impl Spread {
     /// Measures the tiles that touch known ones where those foretell them, until none is new. Returns how many are known.
     pub(crate) fn grow(&mut self, level: &Level, grid: &TileGrid, comb: &Comb, gain: f32) -> usize {
         let (nx, ny) = (grid.nx, grid.ny);
+        let per_px = spacing(grid);
         let mut clear = CLEAR.into_iter();
         let mut least = CLEAR[0];
         loop {
@@ -107,7 +108,6 @@ impl Spread {
                 if sum.count < 0.5 * grid.area {
                     continue;
                 }
-                let per_px = spacing(grid);
                 let found = |f: usize| {
                     let k = (local[f][1] / per_px[0]).hypot(local[f][2] / per_px[1]) * level.scale;
                     comb.peak(f, &sum, k)

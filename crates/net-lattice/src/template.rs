@@ -58,11 +58,8 @@ impl Profile {
 /// Coverage and derivative at `q` cells from a twine, |q| <= 1/2.
 #[inline]
 pub(crate) fn look_up(row: &[[f32; 2]; POSITIONS + 1], q: f32) -> (f32, f32) {
-    let x = q.abs() * (2 * POSITIONS) as f32;
-    let i = (x as usize).min(POSITIONS - 1);
-    let f = x - i as f32;
-    let (a, b) = (row[i], row[i + 1]);
-    (a[0] + f * (b[0] - a[0]), (a[1] + f * (b[1] - a[1])).copysign(a[1] * q))
+    let (value, slope) = look_up_all(row, &[q]);
+    (value[0], slope[0])
 }
 
 /// The same for many places.
