@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --no-default-features --example thesis_peer -- FOLDER` writes `NAME.pgm` and prints lines of comma-separated fields:
 //! `truth,NAME,range_m,nx,ny,nz`, `pose,NAME,METHOD,range_m,nx,ny,nz,probability` (empty without a net) and `time,NAME,STAGE,microseconds` (on a core).
+//! After each picture it prints `done,NAME` and waits for a line: the other half has its turn, under the same load of the machine.
 
 use std::error::Error;
 use std::path::Path;
@@ -159,6 +160,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("time,{name},default: all sections together,{}", mean_time(|| together.estimate(view).is_ok()));
         print_pose(&name, "thesis", thesis.estimate(view)?.as_ref());
         print_pose(&name, "default", together.estimate(view)?.as_ref());
+        println!("done,{name}");
+        std::io::stdin().read_line(&mut String::new())?;
     }
     Ok(())
 }

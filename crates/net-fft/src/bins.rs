@@ -38,6 +38,7 @@ impl Bins {
 }
 
 /// Calls `map` on the bins `(kx, y0), (kx, y0 + 1), ..` in one or two runs, and puts what it makes of them into `out` in that order. `y0` is not positive.
+#[inline(always)]
 pub(crate) fn map_column<T>(
     spectrum: &HalfSpectrum,
     kx: isize,

@@ -4,7 +4,7 @@ use net_image::View;
 use rustfft::num_complex::Complex32;
 
 use crate::error::{Error, Result};
-use crate::line_fft::LineFft;
+use crate::line_fft::{LineFft, LineScratch};
 
 /// Plans and scratch for images of one size. See the crate's manual for normalization and output order.
 ///
@@ -19,7 +19,7 @@ pub struct RealFft2 {
     rows: [Vec<f32>; 2],
     /// Pairs of rows transformed, pair by pair.
     pairs: Vec<Complex32>,
-    scratch: Vec<Complex32>,
+    scratch: LineScratch,
 }
 
 impl std::fmt::Debug for RealFft2 {
@@ -38,17 +38,9 @@ impl RealFft2 {
             return Err(Error::EmptySize { width, height });
         }
         let (row_plan, column_plan) = (LineFft::new(width), LineFft::new(height));
-        let scratch = row_plan.scratch_len().max(column_plan.scratch_len());
+        let scratch = LineScratch::of(&[&row_plan, &column_plan]);
         let pairs = vec![Complex32::default(); width * height.div_ceil(2)];
-        Ok(Self {
-            width,
-            height,
-            rows: [vec![0.0; width], vec![0.0; width]],
-            pairs,
-            scratch: vec![Complex32::default(); scratch],
-            row_plan,
-            column_plan,
-        })
+        Ok(Self { width, height, rows: [vec![0.0; width], vec![0.0; width]], pairs, scratch, row_plan, column_plan })
     }
 
     /// Width of the images it was planned for, px.

@@ -16,6 +16,25 @@ const LANES: usize = 8;
 /// Their real and imaginary parts.
 type Numbers = [f32; 2 * LANES];
 
+/// What transforms of one length write to on their way.
+#[derive(Clone, Default)]
+pub(crate) struct LineScratch {
+    numbers: Vec<Complex32>,
+    /// Of a prime factor's rows j and -j, side by side: their sum, and their difference times -i.
+    pairs: Vec<[Numbers; 2]>,
+}
+
+impl LineScratch {
+    /// Scratch for each of `plans`.
+    pub fn of(plans: &[&LineFft]) -> Self {
+        let longest = |length: fn(&LineFft) -> usize| plans.iter().map(|plan| length(plan)).max().unwrap_or(0);
+        Self {
+            numbers: vec![Complex32::default(); longest(LineFft::scratch_len)],
+            pairs: vec![Default::default(); longest(LineFft::half_prime)],
+        }
+    }
+}
+
 /// Transforms in place of lines of one length, in natural order.
 #[derive(Clone)]
 pub(crate) enum LineFft {
@@ -42,18 +61,24 @@ impl LineFft {
         Self::Library(Arc::new(BluesteinsAlgorithm::new(length, planner.plan_fft_forward(inner))))
     }
 
-    /// Length of the scratch that [`Self::process`] needs.
-    pub fn scratch_len(&self) -> usize {
+    fn scratch_len(&self) -> usize {
         match self {
             Self::Library(plan) => plan.get_inplace_scratch_len(),
             Self::Prime(plan) => plan.scratch_len(),
         }
     }
 
-    /// Transforms one line.
-    pub fn process(&self, line: &mut [Complex32], scratch: &mut [Complex32]) {
+    fn half_prime(&self) -> usize {
         match self {
-            Self::Library(plan) => plan.process_with_scratch(line, scratch),
+            Self::Library(_) => 0,
+            Self::Prime(plan) => plan.prime / 2,
+        }
+    }
+
+    /// Transforms one line.
+    pub fn process(&self, line: &mut [Complex32], scratch: &mut LineScratch) {
+        match self {
+            Self::Library(plan) => plan.process_with_scratch(line, &mut scratch.numbers),
             Self::Prime(plan) => plan.process(line, scratch),
         }
     }
@@ -105,25 +130,23 @@ impl PrimeFft {
     }
 
     /// The line is a table of as many rows as the prime says.
-    fn process(&self, line: &mut [Complex32], scratch: &mut [Complex32]) {
-        let (turned, scratch) = scratch.split_at_mut(self.twiddles.len());
-        self.arch.dispatch(Columns { plan: self, table: line, out: turned });
+    fn process(&self, line: &mut [Complex32], scratch: &mut LineScratch) {
+        let (turned, rest) = scratch.numbers.split_at_mut(self.twiddles.len());
+        let pairs = &mut scratch.pairs[..self.prime / 2];
+        self.arch.dispatch(Columns { plan: self, table: line, pairs, out: turned });
         for (to, twiddle) in turned.iter_mut().zip(&self.twiddles) {
             *to *= twiddle;
         }
-        self.rest.process_with_scratch(turned, scratch);
+        self.rest.process_with_scratch(turned, rest);
         transpose::transpose(turned, line, self.rest.len(), self.prime);
     }
 
     /// Transforms columns `first` and on, as many as there are lanes.
     #[inline(always)]
-    fn transform_columns(&self, table: &[Complex32], first: usize, out: &mut [Complex32]) {
+    fn transform_columns(&self, table: &[Complex32], first: usize, pairs: &mut [[Numbers; 2]], out: &mut [Complex32]) {
         let width = self.rest.len();
         let half = self.prime / 2;
         let row = |v: usize| numbers(&table[v * width + first..]);
-        // Of rows j and -j: their sum, and their difference times -i.
-        let mut pairs = [[Numbers::default(); 2]; LARGEST_DIRECT_PRIME / 2];
-        let pairs = &mut pairs[..half];
         let constant = row(0);
         let mut total = constant;
         for (j, [sum, difference]) in pairs.iter_mut().enumerate() {
@@ -168,6 +191,7 @@ impl PrimeFft {
 struct Columns<'a> {
     plan: &'a PrimeFft,
     table: &'a [Complex32],
+    pairs: &'a mut [[Numbers; 2]],
     out: &'a mut [Complex32],
 }
 
@@ -177,7 +201,7 @@ impl pulp::WithSimd for Columns<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         for first in (0..self.plan.rest.len()).step_by(LANES) {
-            self.plan.transform_columns(self.table, first, self.out);
+            self.plan.transform_columns(self.table, first, self.pairs, self.out);
         }
     }
 }

@@ -28,6 +28,8 @@ impl Default for SpectrumImageConfig {
 /// zero lies. The constant bin itself, which mean removal empties, does not count for the weakest.
 #[derive(Debug, Clone, Default)]
 pub struct SpectrumImage {
+    /// The widest vectors that the processor has.
+    arch: pulp::Arch,
     image: Image<u8>,
     constant_bin: (usize, usize),
     per_level: f32,
@@ -46,9 +48,24 @@ impl SpectrumImage {
         self.constant_bin = (-x0 as usize, -y0 as usize);
         let (columns, rows) = ((x1 - x0 + 1) as usize, (y1 - y0 + 1) as usize);
 
+        self.arch.dispatch(DrawColumns { picture: self, spectrum, columns: (x0, x1), first_row: y0, rows, config });
+        self.image.resize(columns, rows);
+        transpose::transpose(&self.columns, self.image.data_mut(), rows, columns);
+    }
+
+    /// Draws columns `x0` to `x1` of the spectrum as rows, from bin `y0` on.
+    #[inline(always)]
+    fn draw_columns(
+        &mut self,
+        spectrum: &HalfSpectrum,
+        (x0, x1): (isize, isize),
+        y0: isize,
+        rows: usize,
+        config: SpectrumImageConfig,
+    ) {
         let scale = Scale::of(spectrum, config.logarithm);
         self.per_level = scale.per_level();
-        self.columns.resize(columns * rows, 0);
+        self.columns.resize((x1 - x0 + 1) as usize * rows, 0);
         for (kx, to) in (x0..=x1).zip(self.columns.chunks_exact_mut(rows)) {
             map_column(spectrum, kx, y0, to, |bins, levels| scale.levels(bins, levels));
         }
@@ -56,8 +73,6 @@ impl SpectrumImage {
             blur(&self.columns, rows, &mut self.blurred);
             std::mem::swap(&mut self.columns, &mut self.blurred);
         }
-        self.image.resize(columns, rows);
-        transpose::transpose(&self.columns, self.image.data_mut(), rows, columns);
     }
 
     /// The grey picture; `None` before the first [`Self::draw`].
@@ -81,6 +96,25 @@ impl SpectrumImage {
     }
 }
 
+/// [`SpectrumImage::draw_columns`] as a task for the widest vectors that the processor has.
+struct DrawColumns<'a> {
+    picture: &'a mut SpectrumImage,
+    spectrum: &'a HalfSpectrum,
+    columns: (isize, isize),
+    first_row: isize,
+    rows: usize,
+    config: SpectrumImageConfig,
+}
+
+impl pulp::WithSimd for DrawColumns<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.picture.draw_columns(self.spectrum, self.columns, self.first_row, self.rows, self.config);
+    }
+}
+
 /// From a bin to its grey level.
 struct Scale {
     logarithm: bool,
@@ -89,6 +123,7 @@ struct Scale {
 }
 
 impl Scale {
+    #[inline(always)]
     fn of(spectrum: &HalfSpectrum, logarithm: bool) -> Self {
         // In lanes, which the compiler makes vectors of: one comparison does not wait for the one before.
         let (mut lows, mut highs) = ([f32::INFINITY; 8], [0.0f32; 8]);
@@ -113,6 +148,7 @@ impl Scale {
         if self.levels_per_unit > 0.0 { self.levels_per_unit.recip() } else { 0.0 }
     }
 
+    #[inline(always)]
     fn levels(&self, bins: &[Complex32], levels: &mut [u8]) {
         // Rounded: the digits after the point do not fit beside 2^23. (A cast minds values out of range one by one.)
         let level = |x: f32| {
@@ -128,6 +164,7 @@ impl Scale {
 }
 
 /// Weights 1 2 1 along both directions, borders repeated.
+#[inline(always)]
 fn blur(image: &[u8], width: usize, out: &mut Vec<u8>) {
     let height = image.len() / width;
     out.resize(image.len(), 0);

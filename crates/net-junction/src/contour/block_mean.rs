@@ -17,6 +17,7 @@ pub(crate) struct BlockMean {
 impl BlockMean {
     /// Mean over each pixel's block, as far as it lies inside the picture, into `out`. `half_blocks` holds half of a block's side less the pixel itself,
     /// px, for every tile, row by row. Values are at most 4080.
+    #[inline(always)]
     pub fn take(&mut self, source: &Image<u16>, half_blocks: &[u16], out: &mut Image<u16>) {
         out.resize(source.width(), source.height());
         let first = half_blocks.first().copied().unwrap_or(0);
@@ -34,6 +35,7 @@ impl BlockMean {
     }
 
     /// Blocks of `SIDE` px everywhere: sums that move on from row to row.
+    #[inline(always)]
     fn small_blocks<const SIDE: usize>(&mut self, source: &Image<u16>, out: &mut Image<u16>) {
         let (width, height, half) = (source.width(), source.height(), SIDE / 2);
         self.columns.clear();
@@ -68,6 +70,7 @@ impl BlockMean {
         }
     }
 
+    #[inline(always)]
     fn sum_up(&mut self, source: &Image<u16>) {
         let (width, height) = (source.width(), source.height());
         let stride = width + 1;
@@ -86,6 +89,7 @@ impl BlockMean {
     }
 
     /// Blocks of any size, from four of the sums each.
+    #[inline(always)]
     fn means_by_sums(&self, half_blocks: &[u16], out: &mut Image<u16>) {
         let (width, height) = (out.width(), out.height());
         let (stride, tiles_wide) = (width + 1, width.div_ceil(TILE));

@@ -32,10 +32,6 @@ impl Level {
     pub fn values(&self) -> &[i16] {
         &self.values
     }
-    /// Width of the picture without the frame, px.
-    pub fn width(&self) -> usize {
-        self.width
-    }
     /// Height of the picture without the frame, px.
     pub fn height(&self) -> usize {
         self.height

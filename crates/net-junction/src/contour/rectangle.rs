@@ -58,6 +58,51 @@ fn half_hull<'a>(ordered: impl Iterator<Item = &'a Vector2<f64>>, hull: &mut Vec
     hull.pop();
 }
 
+/// Convex hull of a closed outline that does not cross itself, in the sense from u to v, into `hull` (cleared first): every point is met once, none is
+/// sorted (Melkman 1987). `deque` is scratch. Fewer than three hull points mean that the points lie on a line.
+pub(crate) fn outline_hull(outline: &[Vector2<f64>], deque: &mut Vec<Vector2<f64>>, hull: &mut Vec<Vector2<f64>>) {
+    hull.clear();
+    let Some((&(mut a), rest)) = outline.split_first() else { return };
+    let turn = |from: Vector2<f64>, to: Vector2<f64>, p: Vector2<f64>| (to - from).perp(&(p - to));
+    // The ends of the line that the outline begins with, up to its first turn.
+    let mut b = a;
+    let Some(first) = rest.iter().position(|&p| {
+        let turns = turn(a, b, p) != 0.0;
+        if !turns && (p - b).dot(&(b - a)) >= 0.0 {
+            b = p;
+        } else if !turns && (p - a).dot(&(b - a)) < 0.0 {
+            a = p;
+        }
+        turns
+    }) else {
+        hull.extend([a, b]);
+        return;
+    };
+    // The hull of the points so far lies between `bottom` and `top`, with the newest at both ends.
+    deque.clear();
+    deque.resize(2 * outline.len() + 2, Vector2::zeros());
+    let (mut bottom, mut top) = (outline.len() - 1, outline.len() + 2);
+    let mut newest = rest[first];
+    // Its neighbours on the hull.
+    let (mut after, mut before) = if turn(a, b, newest) > 0.0 { (a, b) } else { (b, a) };
+    deque[bottom..=top].copy_from_slice(&[newest, after, before, newest]);
+    for &p in &rest[first + 1..] {
+        if turn(newest, after, p) > 0.0 && turn(before, newest, p) > 0.0 {
+            continue;
+        }
+        while bottom + 1 < top && turn(deque[bottom], deque[bottom + 1], p) <= 0.0 {
+            bottom += 1;
+        }
+        while bottom + 1 < top && turn(deque[top - 1], deque[top], p) <= 0.0 {
+            top -= 1;
+        }
+        (newest, after, before) = (p, deque[bottom], deque[top]);
+        (bottom, top) = (bottom - 1, top + 1);
+        (deque[bottom], deque[top]) = (p, p);
+    }
+    hull.extend_from_slice(&deque[bottom..top]);
+}
+
 /// The rectangle of least area around a convex polygon in the sense from u to v, by rotating calipers (Toussaint 1983):
 /// one of its sides lies on a side of the polygon. `None` for fewer than three corners or no area.
 pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
@@ -65,46 +110,36 @@ pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
     if n < 3 {
         return None;
     }
-    // Past the last corner comes the first; a remainder would cost more than the rest.
-    let corner = |k: usize| {
-        hull[if k < n {
-            k
-        } else if k < 2 * n {
-            k - n
-        } else {
-            k % n
-        }]
+    let next = |k: usize| if k + 1 < n { k + 1 } else { 0 };
+    // On from corner `k` while the polygon's side there runs along `direction`. At most one round: guards against a polygon that is not convex.
+    let climb = |mut k: usize, direction: Vector2<f64>| {
+        for _ in 0..n {
+            if direction.dot(&(hull[next(k)] - hull[k])) <= 0.0 {
+                break;
+            }
+            k = next(k);
+        }
+        k
     };
-    // The side's two ends, then the corners farthest along it, across it, and back along it: each of these only ever moves on.
     let mut best = None;
     let mut least = f64::INFINITY;
-    let (mut ahead, mut across, mut back) = (1, 1, 1);
+    // The corners farthest along a side, across it, and back along it: each of these only ever moves on.
+    let mut farthest: Option<[usize; 3]> = None;
     for (i, &here) in hull.iter().enumerate() {
         // Not of unit length: lengths along and across it are so many times too long.
-        let side = corner(i + 1) - here;
+        let side = hull[next(i)] - here;
         let square = side.norm_squared();
         // Two corners in one place, or no numbers at all.
         if square.is_nan() || square <= 0.0 {
             continue;
         }
         let normal = Vector2::new(-side.y, side.x);
-        let climb = |mut k: usize, direction: Vector2<f64>| {
-            let mut at = direction.dot(&corner(k));
-            // At most one round: guards against a polygon that is not convex.
-            for _ in 0..n {
-                let next = direction.dot(&corner(k + 1));
-                if next <= at {
-                    break;
-                }
-                (k, at) = (k + 1, next);
-            }
-            (k, at)
-        };
-        let (high, far, low);
-        (ahead, high) = climb(ahead.max(i + 1), side);
-        (across, far) = climb(across.max(ahead), normal);
-        (back, low) = climb(back.max(across), -side);
-        let (low, near) = (-low, normal.dot(&here));
+        let ahead = climb(farthest.map_or(next(i), |[ahead, _, _]| ahead), side);
+        let across = climb(farthest.map_or(ahead, |[_, across, _]| across), normal);
+        let back = climb(farthest.map_or(across, |[_, _, back]| back), -side);
+        farthest = Some([ahead, across, back]);
+        let [high, far, low] = [side.dot(&hull[ahead]), normal.dot(&hull[across]), side.dot(&hull[back])];
+        let near = normal.dot(&here);
         let area = (high - low) * (far - near) / square;
         if area < least {
             least = area;

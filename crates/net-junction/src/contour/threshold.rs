@@ -15,6 +15,8 @@ const BLOCK_MAX: f64 = 1001.0;
 /// Buffers of the threshold stage.
 #[derive(Debug, Default)]
 pub(crate) struct Threshold {
+    /// The widest vectors that the processor has.
+    arch: pulp::Arch,
     blurred: Image<u16>,
     scratch: Image<u16>,
     block_mean: BlockMean,
@@ -39,8 +41,13 @@ impl Threshold {
         self.tiles_wide = width.div_ceil(TILE);
         self.tiles_high = height.div_ceil(TILE);
         self.plan_blocks(width, height, config, &cell_side);
-        let side = self.small_side(config);
-        self.blur(image, (config.blur_cells * side).max(config.blur_min_px));
+        let sigma = (config.blur_cells * self.small_side(config)).max(config.blur_min_px);
+        self.arch.dispatch(TakeMeanAway { threshold: self, image, sigma, config });
+    }
+
+    #[inline(always)]
+    fn take_mean_away(&mut self, image: GrayView, sigma: f64, config: &Config) {
+        self.blur(image, sigma);
         let boxes = if config.mean == LocalMean::Box { 1 } else { 3 };
         for pass in 0..boxes {
             if pass > 0 {
@@ -49,7 +56,7 @@ impl Threshold {
             let source = if pass == 0 { &self.blurred } else { &self.scratch };
             self.block_mean.take(source, &self.half_blocks, &mut self.mean);
         }
-        self.deviation.resize(width, height);
+        self.deviation.resize(image.width(), image.height());
         let pixels = self.blurred.data().iter().zip(self.mean.data());
         for (d, (&b, &m)) in self.deviation.data_mut().iter_mut().zip(pixels) {
             // Both at most 255 * 16.
@@ -60,6 +67,12 @@ impl Threshold {
 
     /// Signed distance from the threshold for light (`true`) or dark twine.
     pub fn level(&mut self, light: bool) -> &Level {
+        self.arch.dispatch(DrawLevel { threshold: self, light });
+        &self.level
+    }
+
+    #[inline(always)]
+    fn draw_level(&mut self, light: bool) {
         let (width, height) = (self.deviation.width(), self.deviation.height());
         self.level.resize(width, height);
         let (wide, high) = (self.tiles_wide, self.tiles_high);
@@ -88,7 +101,6 @@ impl Threshold {
                 u = end;
             }
         }
-        &self.level
     }
 
     fn plan_blocks(
@@ -133,6 +145,7 @@ impl Threshold {
     }
 
     /// Binomial blur of the variance nearest to `sigma²`: each pass of 1-2-1 adds a half.
+    #[inline(always)]
     fn blur(&mut self, image: GrayView, sigma: f64) {
         let (width, height) = (image.width(), image.height());
         self.blurred.resize(width, height);
@@ -165,6 +178,7 @@ impl Threshold {
     }
 
     /// Threshold offset per tile: mean absolute deviation over the tiles that the block touches.
+    #[inline(always)]
     fn measure_spread(&mut self, config: &Config) {
         let (width, height) = (self.deviation.width(), self.deviation.height());
         let (wide, high) = (self.tiles_wide, self.tiles_high);
@@ -188,6 +202,38 @@ impl Threshold {
                 self.offsets.push(offset.max((config.offset_grey * SCALE) as f32).min(4080.0));
             }
         }
+    }
+}
+
+/// [`Threshold::take_mean_away`] for the widest vectors that the processor has.
+struct TakeMeanAway<'a> {
+    threshold: &'a mut Threshold,
+    image: GrayView<'a>,
+    sigma: f64,
+    config: &'a Config,
+}
+
+impl pulp::WithSimd for TakeMeanAway<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.threshold.take_mean_away(self.image, self.sigma, self.config);
+    }
+}
+
+/// [`Threshold::draw_level`] for the same.
+struct DrawLevel<'a> {
+    threshold: &'a mut Threshold,
+    light: bool,
+}
+
+impl pulp::WithSimd for DrawLevel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.threshold.draw_level(self.light);
     }
 }
 

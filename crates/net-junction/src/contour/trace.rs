@@ -34,25 +34,33 @@ impl Tracer {
     /// Hands every opening's outer outline of at most `longest` points to `visit`, in the order of their top-left pixels.
     /// Outlines of twine inside an opening are left out.
     pub fn trace(&mut self, level: &Level, longest: usize, mut visit: impl FnMut(Outline)) {
-        let stride = level.stride();
+        let (values, stride) = (level.values(), level.stride());
         self.passed.clear();
-        self.passed.resize(level.values().len(), false);
-        for v in 0..level.height() {
-            let first = (v + 1) * stride + 1;
-            let row = &level.values()[first - 1..][..level.width() + 1];
-            for u in (0..level.width()).step_by(STRIP) {
-                let end = (u + STRIP).min(level.width());
-                let pairs = || row[u..end].iter().zip(&row[u + 1..=end]);
-                // Most strips hold no left crack: a look at the signs of all of them at once.
-                if pairs().fold(0, |any, (&left, &here)| any | (!left & here)) >= 0 {
-                    continue;
-                }
-                for (k, (&left, &here)) in (u..end).zip(pairs()) {
-                    if left >= 0 && here < 0 && !self.passed[first + k] {
-                        self.follow(level, first + k, (k as i32, v as i32), longest, &mut visit);
-                    }
+        self.passed.resize(values.len(), false);
+        // The frame is twine, so a left crack found in all rows at once belongs to a pixel of the picture.
+        let (lefts, _) = values.as_chunks::<STRIP>();
+        let (heres, _) = values.get(1..).unwrap_or(&[]).as_chunks::<STRIP>();
+        let mut look = |first: usize, cracks: &[i16]| {
+            for (pixel, &crack) in (first..).zip(cracks) {
+                if crack < 0 && !self.passed[pixel] {
+                    let position = ((pixel % stride) as i32 - 1, (pixel / stride) as i32 - 1);
+                    self.follow(level, pixel, position, longest, &mut visit);
                 }
             }
+        };
+        let mut first = 1;
+        for (left, here) in lefts.iter().zip(heres) {
+            // Negative where twine is left of an opening.
+            let cracks: [i16; STRIP] = std::array::from_fn(|k| !left[k] & here[k]);
+            // Most strips hold none: a look at all signs at once.
+            if cracks.iter().fold(0, |any, &crack| any | crack) < 0 {
+                look(first, &cracks);
+            }
+            first += STRIP;
+        }
+        for (&left, &here) in values.get(first - 1..).unwrap_or(&[]).iter().zip(values.get(first..).unwrap_or(&[])) {
+            look(first, &[!left & here]);
+            first += 1;
         }
     }
 
@@ -66,56 +74,47 @@ impl Tracer {
         visit: &mut impl FnMut(Outline),
     ) {
         let (values, stride) = (level.values(), level.stride());
-        let (last_u, last_v) = (level.width() as i32 - 1, level.height() as i32 - 1);
         // East, south, west, north: turning right adds one.
         let (along_u, along_v) = ([1, 0, -1, 0], [0, 1, 0, -1]);
         let steps = [1_isize, stride as isize, -1, -(stride as isize)];
         // The frame is one pixel wide, so a step from a pixel of the picture, or one more to the side, stays inside `values`.
         let at = |pixel: usize, direction: usize| pixel.wrapping_add_signed(steps[direction]);
         self.points.clear();
-        let (mut cut, mut doubled_area) = (false, 0_i64);
+        let (mut cut, mut turns) = (false, 0);
         let (mut pixel, mut heading) = (start, 3);
         loop {
             let left = (heading + 3) & 3;
-            let outside = at(pixel, left);
+            let outside = values[at(pixel, left)];
             if heading == 3 {
                 self.passed[pixel] = true;
             }
-            // The crack's part of the shoelace sum: only cracks along u add v du.
-            match heading {
-                0 => doubled_area -= 2 * i64::from(v),
-                2 => doubled_area += 2 * i64::from(v + 1),
-                _ => {}
-            }
-            cut |= match left {
-                0 => u == last_u,
-                1 => v == last_v,
-                2 => u == 0,
-                _ => v == 0,
-            };
+            cut |= outside == FRAME;
             if self.points.len() <= longest {
-                let (inner, outer) = (f64::from(values[pixel]), f64::from(values[outside]));
+                let (inner, outer) = (f64::from(values[pixel]), f64::from(outside));
                 // inner < 0 <= outer; the frame's level is no measurement.
-                let part = if values[outside] == FRAME { 0.5 } else { inner / (inner - outer) };
+                let part = if outside == FRAME { 0.5 } else { inner / (inner - outer) };
                 let (du, dv) = (f64::from(along_u[left]), f64::from(along_v[left]));
                 self.points.push(Vector2::new(f64::from(u) + du * part, f64::from(v) + dv * part));
             }
             let ahead = at(pixel, heading);
             if values[ahead] >= 0 {
                 heading = (heading + 1) & 3;
+                turns += 1;
             } else {
                 (pixel, u, v) = (ahead, u + along_u[heading], v + along_v[heading]);
                 let aside = at(ahead, left);
                 if values[aside] < 0 {
                     (pixel, u, v) = (aside, u + along_u[left], v + along_v[left]);
                     heading = left;
+                    turns -= 1;
                 }
             }
             if pixel == start && heading == 3 {
                 break;
             }
         }
-        if doubled_area > 0 && self.points.len() <= longest {
+        // Four turns to the right lead once round an opening, four to the left round twine inside one.
+        if turns > 0 && self.points.len() <= longest {
             visit(Outline { points: &self.points, area: polygon_area(&self.points), cut });
         }
     }
