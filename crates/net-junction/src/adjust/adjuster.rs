@@ -8,9 +8,10 @@ use crate::adjust::grow::{Grower, Warped};
 use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
 use crate::adjust::presence::{Presence, Twine, TwineState};
-use crate::adjust::profile::{COARSE_PX, FINE_PX, Profiles, Source};
+use crate::adjust::profile::{FINE_PX, Profiles, coarse_px};
 use crate::adjust::seen::{Witnesses, own_twines};
 use crate::adjust::solve::Solver;
+use crate::adjust::source::Source;
 use crate::adjust::spread::{Led, Spreader};
 use crate::adjust::template::Look;
 use crate::error::{Error, Result};
@@ -106,13 +107,15 @@ impl NetAdjuster {
         if graph.edges.is_empty() {
             return Ok(&self.junctions);
         }
+        let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
         // 1. How the camera moved, and outward from the seed what the prediction misses smoothly.
         let mut look = Look {
             twine_m: config.twines_m[config.twines_m.len() / 2],
             blur_px: [0.0; 2],
             spread_px: config.point_spread_px,
+            coarse_px: coarse_px(cell),
         };
-        let cell = median_of(&mut self.values, graph.nodes.iter().map(|n| n.height));
+        source.shrink(look.coarse_px);
         let diagonal = (width as f64).hypot(height as f64);
         look.blur_px = locator.fit_blur(source, graph, profiles, cell, &look, config);
         let warp = grower.grow(source, graph, seed, diagonal, &look, config);
@@ -151,7 +154,7 @@ impl NetAdjuster {
         // 1. From wide to narrow search on the same profiles.
         let (last, wider) = config.search_cells.split_last().unwrap_or((&0.12, &[]));
         if let Some(&widest) = wider.first() {
-            locator.look(source, graph, look, widest, COARSE_PX);
+            locator.look(source, graph, look, widest, look.coarse_px);
             solver.start(graph, &locator.profiles.along, config);
             for (pass, &search) in wider.iter().enumerate() {
                 locator.reach(graph, search);

@@ -20,6 +20,9 @@ pub(crate) struct Appearance {
     /// By block: whether the template is twine on the line.
     pub centred: Vec<bool>,
     amplitudes: Vec<f32>,
+    rows: Vec<f32>,
+    block_sums: Vec<f32>,
+    sum: Vec<f32>,
     energies: Vec<f32>,
     pub half: usize,
 }
@@ -50,21 +53,25 @@ impl Appearance {
     /// Template of each block: the mean of the profiles around; with `known` only of those that look like twine.
     fn average(&mut self, graph: &Graph, known: bool) {
         let width = 2 * self.half + 1;
-        self.templates.clear();
-        self.templates.resize(graph.blocks.count() * width, 0.0);
-        for (block, template) in self.templates.chunks_exact_mut(width).enumerate() {
+        // Of each line as many values, and whether they are there.
+        let row_width = width + 1;
+        self.rows.clear();
+        for e in 0..graph.edges.len() {
+            let known = self.means.inside[e] && (!known || ALIKE.contains(&self.amplitudes[e]));
+            self.rows.extend(self.means.row(e)[SHIFT..][..width].iter().map(|m| if known { *m } else { 0.0 }));
+            self.rows.push(f32::from(known));
+        }
+        let Self { rows, block_sums, sum, templates, .. } = self;
+        graph.blocks.sum_members(row_width, |e| rows.get(e * row_width..)?.get(..row_width), block_sums);
+        templates.clear();
+        templates.resize(graph.blocks.count() * width, 0.0);
+        for (block, template) in templates.chunks_exact_mut(width).enumerate() {
             if graph.blocks.members(block).is_empty() {
                 continue;
             }
-            let mut count = 0.0_f32;
-            for &e in graph.blocks.around(block).into_iter().flatten() {
-                let e = e as usize;
-                if self.means.inside[e] && (!known || ALIKE.contains(&self.amplitudes[e])) {
-                    template.iter_mut().zip(&self.means.row(e)[SHIFT..]).for_each(|(s, m)| *s += m);
-                    count += 1.0;
-                }
-            }
-            template.iter_mut().for_each(|s| *s /= count.max(1.0));
+            graph.blocks.sum_around(block, row_width, block_sums, sum);
+            let share = 1.0 / sum[width].max(1.0);
+            template.iter_mut().zip(sum.iter()).for_each(|(t, s)| *t = share * s);
             remove_line(template);
         }
     }

@@ -1,6 +1,8 @@
 //! Neighbourhoods of twines: blocks of 3 x 3 cells that share what is learnt from 9 x 9.
 
-use crate::adjust::graph::{Edge, Node, median};
+use std::ops::Range;
+
+use crate::adjust::graph::{Edge, Node};
 
 /// Cells along a block's side.
 const SIDE: i32 = 3;
@@ -16,7 +18,8 @@ pub(crate) struct Blocks {
     starts: Vec<u32>,
     members: Vec<u32>,
     next: Vec<u32>,
-    scratch: Vec<f32>,
+    keys: Vec<i32>,
+    scratch: Vec<i32>,
 }
 
 impl Blocks {
@@ -65,18 +68,45 @@ impl Blocks {
         &self.members[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Edges of the same family in a block and those around it: three runs of members.
-    pub fn around(&self, block: usize) -> [&[u32]; 3] {
+    /// Where among the members those of the same family in a block and around it are.
+    fn runs(&self, block: usize) -> [Range<usize>; 3] {
         let (row, column) = (block % self.rows, block / self.rows % self.columns);
         let family = block / (self.rows * self.columns);
         let (low, high) = (row.saturating_sub(1), (row + 1).min(self.rows - 1));
         [-1_isize, 0, 1].map(|d| match column.checked_add_signed(d).filter(|&c| c < self.columns) {
             Some(column) => {
                 let line = (family * self.columns + column) * self.rows;
-                &self.members[self.starts[line + low] as usize..self.starts[line + high + 1] as usize]
+                self.starts[line + low] as usize..self.starts[line + high + 1] as usize
             }
-            None => &[],
+            None => 0..0,
         })
+    }
+
+    /// For each block the sum of its members' rows of `width` values, of those that have one.
+    pub fn sum_members<'a>(&self, width: usize, row: impl Fn(usize) -> Option<&'a [f32]>, sums: &mut Vec<f32>) {
+        sums.clear();
+        sums.resize(self.count() * width, 0.0);
+        for (block, sum) in sums.chunks_exact_mut(width).enumerate() {
+            for row in self.members(block).iter().filter_map(|&e| row(e as usize)) {
+                sum.iter_mut().zip(row).for_each(|(s, v)| *s += v);
+            }
+        }
+    }
+
+    /// The sum of blocks' rows around a block.
+    pub fn sum_around(&self, block: usize, width: usize, sums: &[f32], out: &mut Vec<f32>) {
+        out.clear();
+        out.resize(width, 0.0);
+        let (row, column) = (block % self.rows, block / self.rows % self.columns);
+        for column in [-1_isize, 0, 1].into_iter().filter_map(|d| column.checked_add_signed(d)) {
+            if column >= self.columns {
+                continue;
+            }
+            let line = (block / (self.rows * self.columns) * self.columns + column) * self.rows;
+            for near in line + row.saturating_sub(1)..=line + (row + 1).min(self.rows - 1) {
+                out.iter_mut().zip(&sums[near * width..][..width]).for_each(|(o, s)| *o += s);
+            }
+        }
     }
 
     /// The four blocks of the same family beside a block.
@@ -93,19 +123,44 @@ impl Blocks {
     /// Median of edges' values around each block into `out` (cleared first); NaN does not count, and blocks without any value get
     /// the overall median, or 0 if there is none. Empty blocks too.
     pub fn local_median(&mut self, values: &[f32], out: &mut Vec<f32>) {
-        let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.clear();
-        scratch.extend(values.iter().filter(|v| !v.is_nan()));
-        let overall = median(&mut scratch).unwrap_or(0.0);
+        let (mut keys, mut scratch) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.scratch));
+        // In the order of members, so that neighbours are three runs.
+        keys.clear();
+        keys.extend(self.members.iter().map(|&e| key(values[e as usize])));
+        let mut overall = None;
         out.clear();
         for block in 0..self.count() {
             scratch.clear();
             if !self.members(block).is_empty() {
-                let near = self.around(block).into_iter().flatten().map(|&e| values[e as usize]);
-                scratch.extend(near.filter(|v| !v.is_nan()));
+                self.runs(block).into_iter().for_each(|run| scratch.extend_from_slice(&keys[run]));
             }
-            out.push(median(&mut scratch).unwrap_or(overall));
+            let middle = median_key(&mut scratch).or_else(|| {
+                *overall.get_or_insert_with(|| {
+                    scratch.clone_from(&keys);
+                    median_key(&mut scratch)
+                })
+            });
+            out.push(middle.map_or(0.0, value));
         }
-        self.scratch = scratch;
+        (self.keys, self.scratch) = (keys, scratch);
     }
+}
+
+/// What is no number comes last.
+const NO_NUMBER: i32 = i32::MAX;
+
+/// A whole number that orders as the value does.
+fn key(value: f32) -> i32 {
+    let bits = value.to_bits() as i32;
+    if value.is_nan() { NO_NUMBER } else { bits ^ ((bits >> 31) & i32::MAX) }
+}
+
+fn value(key: i32) -> f32 {
+    f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
+}
+
+/// Upper median of what are numbers; reorders.
+fn median_key(keys: &mut [i32]) -> Option<i32> {
+    let numbers = keys.iter().filter(|&&k| k != NO_NUMBER).count();
+    (numbers > 0).then(|| *keys.select_nth_unstable(numbers / 2).1)
 }

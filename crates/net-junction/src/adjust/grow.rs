@@ -6,7 +6,7 @@ use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, median, upper};
 use crate::adjust::locate::{kernel_for, reach_px, sign, vertex};
 use crate::adjust::map::LatticeMap;
-use crate::adjust::profile::{COARSE_PX, Source};
+use crate::adjust::source::Source;
 use crate::adjust::template::{Kernels, Look};
 use crate::adjust::warp::{FIRST_RADIUS, Measured, Warp, radii};
 
@@ -55,6 +55,9 @@ pub(crate) struct Grower {
     row_of_edge: Vec<u32>,
     profile: Vec<f32>,
     sums: Vec<i32>,
+    /// Rows of twines that are summed up, and their sums by block.
+    limited: Vec<f32>,
+    block_sums: Vec<f32>,
     sum: Vec<f32>,
     strongest: Vec<f32>,
     signs: Vec<f32>,
@@ -78,8 +81,8 @@ impl Grower {
     ) -> Warp {
         let mut warp = Warp::none(seed);
         let Some(cell) = graph.nodes.first().map(|n| n.height) else { return warp };
-        self.list(graph, config);
-        let steps = self.steps();
+        self.list(graph, look, config);
+        let steps = self.steps(look);
         let seed = self.origin(source, graph, seed, steps, look);
         warp = Warp::none(seed);
         self.twines.iter_mut().for_each(|t| t.radius = (t.from - seed).norm());
@@ -89,7 +92,7 @@ impl Grower {
                     self.sample(source, graph, k, steps, &warp, look);
                 }
             }
-            self.pick(graph, steps);
+            self.pick(graph, steps, look);
             warp.fit(&self.measured, 1 + round.div_ceil(2));
         }
         let moves = |t: &Twine| t.normal.dot(&warp.at(t.from)).abs() / cell_of(graph, t);
@@ -108,7 +111,7 @@ impl Grower {
                 for k in 0..self.twines.len() {
                     self.sample(source, graph, k, steps, w, look);
                 }
-                self.pick(graph, steps);
+                self.pick(graph, steps, look);
                 let near = |m: &&Measured| (m.across - m.normal.dot(&w.at(m.from))).abs() < NEAR_CELLS * m.cell;
                 let near = self.measured.iter().filter(near).count();
                 (near as f64, (self.measured.len() - near) as f64)
@@ -120,10 +123,10 @@ impl Grower {
         warp
     }
 
-    fn list(&mut self, graph: &Graph, config: &AdjustConfig) {
+    fn list(&mut self, graph: &Graph, look: &Look, config: &AdjustConfig) {
         // Odd: both families in turn.
         let stride = graph.edges.len().div_ceil(TWINES) | 1;
-        self.kernels.start(COARSE_PX);
+        self.kernels.start(look.coarse_px);
         self.twines.clear();
         self.row_of_edge.clear();
         self.row_of_edge.resize(graph.edges.len(), u32::MAX);
@@ -157,7 +160,7 @@ impl Grower {
         for k in (0..self.twines.len()).step_by(ORIGIN_STRIDE) {
             self.sample(source, graph, k, steps, &none, look);
         }
-        self.settle_signs(graph, steps);
+        self.settle_signs(graph, steps, look);
         let least = self.least_strength();
         let stands_out = |t: &&Twine| self.strengths[graph.blocks.of_edge(t.edge as usize)] >= least;
         let away = |t: &&Twine| (t.from - seed).norm_squared();
@@ -176,9 +179,9 @@ impl Grower {
     }
 
     /// Offsets on each side.
-    fn steps(&mut self) -> usize {
+    fn steps(&mut self, look: &Look) -> usize {
         let farthest = self.twines.iter().fold(0.0_f32, |most, t| most.max(t.reach));
-        let steps = (f64::from(farthest) / COARSE_PX).ceil() as usize + 1;
+        let steps = (f64::from(farthest) / look.coarse_px).ceil() as usize + 1;
         self.responses.clear();
         self.responses.resize(self.twines.len() * (2 * steps + 1), 0.0);
         steps
@@ -194,7 +197,7 @@ impl Grower {
         self.profile.clear();
         self.profile.resize(2 * half + 1, 0.0);
         let mut inside = [true];
-        source.profiles(ends, [0.0; 2], COARSE_PX, &mut inside, &mut self.sums, &mut self.profile);
+        source.profiles(ends, [0.0; 2], look.coarse_px, &mut inside, &mut self.sums, &mut self.profile);
         let places = 2 * steps + 1;
         let out = &mut self.responses[k * places..][..places];
         self.kernels.amplitudes(&kernel, &self.profile, half - steps, out);
@@ -206,37 +209,37 @@ impl Grower {
     }
 
     /// Whether twine is light or dark around each block, and how much of it there is.
-    fn settle_signs(&mut self, graph: &Graph, steps: usize) {
+    fn settle_signs(&mut self, graph: &Graph, steps: usize, look: &Look) {
         let places = 2 * steps + 1;
-        let Self { twines, responses, row_of_edge, sum, strongest, signs, strengths, .. } = self;
+        let Self { twines, responses, row_of_edge, limited, block_sums, sum, strongest, signs, strengths, .. } = self;
         strongest.clear();
         let most = |row: &[f32]| row.iter().fold(0.0_f32, |most, a| most.max(a.abs()));
         let sampled = twines.iter().zip(responses.chunks_exact(places)).filter(|(t, _)| !t.warped.is_nan());
         strongest.extend(sampled.map(|(_, row)| most(row)).filter(|&a| a > 0.0));
         let limit = 1.5 * median(strongest).unwrap_or(0.0) + 1e-6;
+        // Limited amplitudes, whether there are any, and how far they reach.
+        let width = places + 2;
+        limited.clear();
+        for (t, row) in twines.iter().zip(responses.chunks_exact(places)) {
+            let known = f32::from(!t.warped.is_nan());
+            limited.extend(row.iter().map(|a| a.clamp(-limit, limit)));
+            limited.extend([known, known * t.reach]);
+        }
+        let row = |e: usize| limited.get(row_of_edge[e] as usize * width..)?.get(..width);
+        graph.blocks.sum_members(width, row, block_sums);
         signs.clear();
         strengths.clear();
         for block in 0..graph.blocks.count() {
-            sum.clear();
-            sum.resize(places, 0.0);
-            let (mut reach, mut count) = (0.0, 0.0_f32);
-            if !graph.blocks.members(block).is_empty() {
-                for &e in graph.blocks.around(block).into_iter().flatten() {
-                    let Some(t) = twines.get(row_of_edge[e as usize] as usize) else { continue };
-                    let row = &responses[row_of_edge[e as usize] as usize * places..][..places];
-                    sum.iter_mut().zip(row).for_each(|(s, a)| *s += a.clamp(-limit, limit));
-                    reach = t.reach;
-                    count += f32::from(!t.warped.is_nan());
-                }
-            }
-            signs.push(sign(sum, reach / COARSE_PX as f32));
-            strengths.push(most(sum) / count.max(ORIGIN_FEWEST));
+            graph.blocks.sum_around(block, width, block_sums, sum);
+            let (amplitudes, count) = (&sum[..places], sum[places]);
+            signs.push(sign(amplitudes, sum[places + 1] / (count.max(1.0) * look.coarse_px as f32)));
+            strengths.push(most(amplitudes) / count.max(ORIGIN_FEWEST));
         }
     }
 
     /// Where the sampled twines lie.
-    fn pick(&mut self, graph: &Graph, steps: usize) {
-        self.settle_signs(graph, steps);
+    fn pick(&mut self, graph: &Graph, steps: usize, look: &Look) {
+        self.settle_signs(graph, steps, look);
         let least = self.least_strength();
         let places = 2 * steps + 1;
         let Self { twines, responses, strongest, signs, strengths, picked, measured, .. } = self;
@@ -247,14 +250,15 @@ impl Grower {
             let sign = signs[block];
             let mut best = (0, 0.0_f32);
             for (k, a) in row.iter().enumerate() {
-                let q = (k as f32 - steps as f32) * COARSE_PX as f32;
+                let q = (k as f32 - steps as f32) * look.coarse_px as f32;
                 let near = if q.abs() > twine.reach { 0.0 } else { 1.0 / (1.0 + (0.5 * q / twine.reach).powi(2)) };
                 if a * sign * near > best.1 {
                     best = (k, a * sign * near);
                 }
             }
             let k = best.0.clamp(1, places - 2);
-            let q = (k as f32 - steps as f32 + vertex([k - 1, k, k + 1].map(|k| row[k] * sign))) * COARSE_PX as f32;
+            let q =
+                (k as f32 - steps as f32 + vertex([k - 1, k, k + 1].map(|k| row[k] * sign))) * look.coarse_px as f32;
             let good = !twine.warped.is_nan() && best.1 > 0.0 && q.abs() < 0.98 * twine.reach;
             picked.push((f64::from(q), if good { row[best.0].abs() } else { 0.0 }));
             // Water beyond the net's end must not say what is usual.

@@ -2,16 +2,17 @@
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Edge, Graph, bend, median, upper};
-use crate::adjust::profile::{COARSE_PX, Profiles, Source};
+use crate::adjust::profile::{COARSE_PX, Profiles};
 use crate::adjust::solve::{Solver, WEIGHT_MAX};
+use crate::adjust::source::Source;
 use crate::adjust::template::{Kernel, Kernels, Look};
 
 /// Amplitudes outside these parts of the neighbours' are something else than twine.
 const AMPLITUDE_PARTS: (f32, f32) = (0.35, 3.0);
 /// Least noise, in parts of strong twine's amplitude.
 const LEAST_NOISE: f32 = 0.15;
-/// Twine is looked for this far at least and at most, px.
-const SEARCH_PX: (f64, f64) = (1.0, 9.0);
+/// Twine is looked for this far at least, px.
+const SEARCH_MIN_PX: f64 = 1.0;
 /// Length over which what the template leaves, as a sum of squares, is taken for noise, px: misfit counts as noise.
 const REST_PX: f32 = 2.5;
 /// Ways of the picture during the exposure that are tried, px; none longer than this part of a cell. Shorter ones leave twine where it is.
@@ -36,6 +37,8 @@ pub(crate) struct Locator {
     responses: Vec<f32>,
     /// For each edge the amplitudes, averaged over its bins, at every offset; limited.
     lines: Vec<f32>,
+    /// By block: their sums.
+    block_lines: Vec<f32>,
     /// By block.
     signs: Vec<f32>,
     /// By edge and bin: offset, in steps, at which twine is picked, and the amplitude there.
@@ -44,6 +47,7 @@ pub(crate) struct Locator {
     amplitudes: Vec<f32>,
     typical: Vec<f32>,
     scratch: Vec<f32>,
+    rests: Vec<f32>,
     sum: Vec<f32>,
     /// Offsets from the chord, px, for each edge and bin.
     pub offsets: Vec<f32>,
@@ -116,24 +120,32 @@ impl Locator {
         let (half, shifts) = ((0.5 * cell).round().max(3.0) as usize, (0.3 * cell).ceil() as usize);
         let stride = (graph.edges.len() / FIT_TWINES) | 1;
         scratch.sample(source, graph, (half + shifts, COARSE_PX), false, stride, Some(1));
+        let places = 2 * shifts + 1;
+        let Self { kernels, scratch: explained, rests, sum: amplitudes, .. } = self;
+        amplitudes.resize(places, 0.0);
         [0, 1].map(|family| {
+            let twines = || (0..graph.edges.len()).step_by(stride).filter(|&e| graph.edges[e].family == family);
+            rests.clear();
             let mut best = (f32::MIN, 0.0);
             let still = config.twines_m.iter().map(|&twine| (twine, 0.0));
             let moving = BLURS_PX.into_iter().take_while(|b| *b <= BLUR_CELLS * cell).map(|b| (look.twine_m, b));
             for (twine, blur) in still.chain(moving) {
-                self.kernels.start(COARSE_PX);
-                self.scratch.clear();
-                for e in (0..graph.edges.len()).step_by(stride).filter(|&e| graph.edges[e].family == family) {
+                kernels.start(COARSE_PX);
+                explained.clear();
+                for (n, e) in twines().enumerate() {
                     let [a, b] = graph.edges[e].nodes.map(|n| &graph.nodes[n as usize]);
                     let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
-                    let kernel = self.kernels.get(width, look.spread_px, blur, half);
-                    let explained = (0..=2 * shifts).map(|k| {
-                        let found = self.kernels.match_at(&kernel, scratch.row(e, 0), half + k);
-                        found.gain / found.rest.max(1e-9)
-                    });
-                    self.scratch.push(explained.fold(0.0, f32::max));
+                    let kernel = kernels.get(width, look.spread_px, blur, half);
+                    let profile = scratch.row(e, 0);
+                    // The same for all kernels, which are of the same length.
+                    if rests.len() == n * places {
+                        rests.extend((0..places).map(|k| kernels.rest(&kernel, profile, half + k).max(1e-9)));
+                    }
+                    kernels.amplitudes(&kernel, profile, half, amplitudes);
+                    let shares = amplitudes.iter().zip(&rests[n * places..]).map(|(a, rest)| kernel.gain(*a) / rest);
+                    explained.push(shares.fold(0.0, f32::max));
                 }
-                let explained = upper(&mut self.scratch).unwrap_or(0.0);
+                let explained = upper(explained).unwrap_or(0.0);
                 // Only what is well better than no motion.
                 let explained = if blur > 0.0 { explained - BLUR_GAIN } else { explained };
                 if explained > best.0 {
@@ -154,7 +166,6 @@ impl Locator {
         self.profiles.sample(source, graph, (self.steps + self.widest(), step_px), false, 1, None);
         let places = 2 * self.steps + 1;
         let first = self.profiles.half - self.steps;
-        self.responses.clear();
         self.responses.resize(graph.edges.len() * self.profiles.bins * places, 0.0);
         for (k, out) in self.responses.chunks_exact_mut(places).enumerate() {
             let (edge, bin) = (k / self.profiles.bins, k % self.profiles.bins);
@@ -186,6 +197,8 @@ impl Locator {
         self.scratch.extend(self.lines.chunks_exact(places).map(strongest));
         let limit = 1.5 * median(&mut self.scratch).unwrap_or(0.0) + 1e-6;
         self.lines.iter_mut().for_each(|a| *a = a.clamp(-limit, limit));
+        let line = |e: usize| Some(&self.lines[e * places..][..places]);
+        graph.blocks.sum_members(places, line, &mut self.block_lines);
         self.signs.clear();
         for block in 0..graph.blocks.count() {
             let Some(&first) = graph.blocks.members(block).first() else {
@@ -193,12 +206,7 @@ impl Locator {
                 continue;
             };
             let reach = self.reaches[first as usize];
-            self.sum.clear();
-            self.sum.resize(places, 0.0);
-            for &e in graph.blocks.around(block).into_iter().flatten() {
-                let line = &self.lines[e as usize * places..][..places];
-                self.sum.iter_mut().zip(line).for_each(|(s, a)| *s += a);
-            }
+            graph.blocks.sum_around(block, places, &self.block_lines, &mut self.sum);
             self.signs.push(sign(&self.sum, reach / self.profiles.step_px as f32));
         }
     }
@@ -244,8 +252,8 @@ impl Locator {
                 // The squared sum that the template leaves, for now.
                 let rest = if good {
                     let at = best.0 + self.profiles.half - self.steps;
-                    let found = self.kernels.match_at(kernel, self.profiles.row(e, bin), at);
-                    ((found.rest - found.gain).max(1e-6) * step / REST_PX).sqrt()
+                    let rest = self.kernels.rest(kernel, self.profiles.row(e, bin), at) - kernel.gain(amplitude);
+                    (rest.max(1e-6) * step / REST_PX).sqrt()
                 } else {
                     f32::NAN
                 };
@@ -292,7 +300,7 @@ pub(crate) fn kernel_for(kernels: &mut Kernels, graph: &Graph, edge: usize, look
 pub(crate) fn reach_px(graph: &Graph, edge: usize, search_cells: f64) -> f32 {
     let edge = &graph.edges[edge];
     let [a, b] = edge.nodes.map(|n| graph.nodes[n as usize].spacing[edge.family]);
-    (search_cells * a.min(b)).clamp(SEARCH_PX.0, SEARCH_PX.1) as f32
+    (search_cells * a.min(b)).max(SEARCH_MIN_PX) as f32
 }
 
 /// Sign of the strongest line in reach (in steps), of amplitudes at every offset. Weights fall slowly: beside a twine the filter answers

@@ -16,6 +16,7 @@ mod presence;
 mod profile;
 mod seen;
 mod solve;
+mod source;
 mod spread;
 mod statistic;
 mod template;

@@ -9,7 +9,8 @@ use crate::adjust::foreign::Foreign;
 use crate::adjust::graph::Graph;
 use crate::adjust::lines::{Lines, Means, SHIFT};
 use crate::adjust::outside::Outside;
-use crate::adjust::profile::{FINE_PX, Profiles, Source};
+use crate::adjust::profile::{FINE_PX, Profiles};
+use crate::adjust::source::Source;
 use crate::adjust::statistic::{evidence, vote};
 
 /// Least scatter of relative amplitudes, of twines and of control lines.

@@ -26,8 +26,9 @@ const JITTER_MIN_PX: f64 = 0.1;
 const BOW_MIN_PX: f32 = 0.05;
 /// Standard deviation of a node's displacement in this pass, cells.
 const SHIFT_CELLS: f64 = 0.25;
-/// Conjugate-gradient steps of a round, at most, and the part of the right side at which they end.
-const STEPS_MAX: usize = 24;
+/// Conjugate-gradient steps of a round, at most, before the last one and in it, and the part of the right side at which they end. Each round goes
+/// on from the last one's solution, and weights need not be known better than that.
+const STEPS_MAX: [usize; 2] = [8, 24];
 const STEPS_END: f32 = 2e-3;
 /// Residuals of which the scale is the median.
 const SCALE_SAMPLE: usize = 2000;
@@ -129,8 +130,9 @@ impl Solver {
         self.weights.extend_from_slice(weights);
         for round in 0..rounds {
             self.assemble(graph, offsets);
-            self.conjugate_gradients(graph);
-            if round + 1 < rounds {
+            let last = round + 1 == rounds;
+            self.conjugate_gradients(graph, STEPS_MAX[usize::from(last)]);
+            if !last {
                 self.reweigh(graph, offsets, weights);
             }
         }
@@ -224,7 +226,7 @@ impl Solver {
         }
     }
 
-    fn conjugate_gradients(&mut self, graph: &Graph) {
+    fn conjugate_gradients(&mut self, graph: &Graph, most: usize) {
         let nodes = graph.nodes.len();
         let dot = |a: &[V2], b: &[V2]| a.iter().zip(b).map(|(x, y)| x.dot(y)).sum::<f32>();
         let precondition = |inverse: &[M2], from: &[V2], to: &mut Vec<V2>| {
@@ -243,7 +245,7 @@ impl Solver {
         precondition(&self.inverse, &self.residual, &mut self.scaled);
         self.direction.clone_from(&self.scaled);
         let mut squared = dot(&self.residual, &self.scaled);
-        for _ in 0..STEPS_MAX {
+        for _ in 0..most {
             if squared <= end || squared.is_nan() {
                 break;
             }

@@ -12,7 +12,7 @@ use net_geometry::nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::Graph;
 use crate::adjust::map::LatticeMap;
-use crate::adjust::profile::{COARSE_PX, Source};
+use crate::adjust::source::Source;
 use crate::adjust::template::{Kernels, Look};
 
 /// Knots each way that lead on, how many it takes to believe a knot that is where they lead, and how many to look for one.
@@ -88,7 +88,7 @@ impl Spreader {
         look: &Look,
         config: &AdjustConfig,
     ) -> usize {
-        self.kernels.start(COARSE_PX);
+        self.kernels.start(look.coarse_px);
         self.knots.clear();
         self.knots.extend(graph.nodes.iter().map(|node| {
             let (i, j) = node.index;

@@ -1,5 +1,9 @@
 //! Matched filter for twine across its direction.
 
+use pulp::{Arch, Simd, WithSimd};
+
+/// Values that are filtered at once.
+const LANES: usize = 8;
 /// Ratio of widths of neighbouring classes is `e` to this.
 const CLASS: f64 = 0.15;
 
@@ -12,6 +16,8 @@ pub(crate) struct Look {
     pub blur_px: [f64; 2],
     /// Standard deviation of the point spread, px.
     pub spread_px: f64,
+    /// Distance between values across the twine to find it, px.
+    pub coarse_px: f64,
 }
 
 impl Look {
@@ -37,6 +43,11 @@ pub(crate) struct Kernel {
 }
 
 impl Kernel {
+    /// Sum of squares that twine of this amplitude explains.
+    pub fn gain(&self, amplitude: f32) -> f32 {
+        amplitude * amplitude * self.energy
+    }
+
     /// Steps on each side of the kernel's middle.
     pub fn half(&self) -> usize {
         self.class.2
@@ -55,11 +66,19 @@ pub(crate) struct Match {
 }
 
 /// Kernels by twine width; keeps its buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Kernels {
     kernels: Vec<Kernel>,
+    /// The kernels' values over their energies: their products with a profile are amplitudes.
     taps: Vec<f32>,
     step_px: f64,
+    arch: Arch,
+}
+
+impl Default for Kernels {
+    fn default() -> Self {
+        Self { kernels: Vec::new(), taps: Vec::new(), step_px: 1.0, arch: Arch::new() }
+    }
 }
 
 impl Kernels {
@@ -82,6 +101,7 @@ impl Kernels {
             return *kernel;
         }
         let (width, blur, half) = ((f64::from(class.0) * CLASS).exp(), 0.25 * f64::from(class.1), class.2 as i32);
+        let sigma = sigma.hypot(spread_of_means(self.step_px));
         let edge = |x: f64| normal_cdf(x / sigma);
         // Integral of `edge`.
         let ramp = |x: f64| x * edge(x) + sigma * (-0.5 * (x / sigma).powi(2)).exp() / std::f64::consts::TAU.sqrt();
@@ -98,53 +118,111 @@ impl Kernels {
         let mean = (-half..=half).map(profile).sum::<f64>() / f64::from(2 * half + 1);
         self.taps.extend((-half..=half).map(|k| (profile(k) - mean) as f32));
         let energy = self.taps[start..].iter().map(|t| t * t).sum::<f32>().max(1e-12);
+        self.taps[start..].iter_mut().for_each(|t| *t /= energy);
         let second = (-half..=half).map(|k| (k * k) as f32).sum();
         let kernel = Kernel { class, start, energy, second };
         self.kernels.push(kernel);
         kernel
     }
 
+    fn taps(&self, kernel: &Kernel) -> &[f32] {
+        &self.taps[kernel.start..][..2 * kernel.half() + 1]
+    }
+
     /// Amplitudes with the kernel's middle at each of `out.len()` successive values of a profile, the first at `first`.
-    #[inline]
     pub fn amplitudes(&self, kernel: &Kernel, profile: &[f32], first: usize, out: &mut [f32]) {
-        let (half, count) = (kernel.half(), out.len());
-        let taps = &self.taps[kernel.start..][..2 * half + 1];
-        let middle = taps[half] / kernel.energy;
-        for (o, p) in out.iter_mut().zip(&profile[first..first + count]) {
-            *o = middle * p;
-        }
-        // Even: both sides at once.
-        for k in 1..=half {
-            let tap = taps[half - k] / kernel.energy;
-            let (before, after) = (&profile[first - k..][..count], &profile[first + k..][..count]);
-            for ((o, a), b) in out.iter_mut().zip(before).zip(after) {
-                *o += tap * (a + b);
-            }
-        }
+        let profile = &profile[first - kernel.half()..][..out.len() + 2 * kernel.half()];
+        self.arch.dispatch(Filter { taps: self.taps(kernel), profile, out });
     }
 
     /// Matches the kernel with its middle at value `at` of the profile, which must hold it whole.
-    #[inline]
     pub fn match_at(&self, kernel: &Kernel, profile: &[f32], at: usize) -> Match {
-        let half = kernel.half();
-        let taps = &self.taps[kernel.start..][..2 * half + 1];
-        let part = &profile[at - half..][..2 * half + 1];
-        // About the middle value, so that squares of large grey levels do not cancel.
-        let base = part[half];
-        let (mut product, mut sum, mut squares, mut slope) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
-        let mut distance = -(half as f32);
-        for (&t, &p) in taps.iter().zip(part) {
-            let p = p - base;
-            product += t * p;
-            sum += p;
-            squares += p * p;
-            slope += distance * p;
-            distance += 1.0;
-        }
-        let amplitude = product / kernel.energy;
-        let rest = squares - sum * sum / taps.len() as f32 - slope * slope / kernel.second;
-        Match { amplitude, gain: amplitude * product, rest: rest.max(0.0) }
+        let part = &profile[at - kernel.half()..][..2 * kernel.half() + 1];
+        let amplitude = self.taps(kernel).iter().zip(part).map(|(t, p)| t * p).sum::<f32>();
+        Match { amplitude, gain: kernel.gain(amplitude), rest: self.rest(kernel, profile, at) }
     }
+
+    /// Sum of squares that constant and slope leave of a profile within the kernel's reach of value `at`.
+    pub fn rest(&self, kernel: &Kernel, profile: &[f32], at: usize) -> f32 {
+        let part = &profile[at - kernel.half()..][..2 * kernel.half() + 1];
+        let Moments { sum, squares, slope } = self.arch.dispatch(Reduce { part, half: kernel.half() });
+        (squares - sum * sum / part.len() as f32 - slope * slope / kernel.second).max(0.0)
+    }
+}
+
+/// A kernel to be run over a profile.
+struct Filter<'a> {
+    taps: &'a [f32],
+    profile: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Filter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { taps, profile, out } = self;
+        if let Some(last) = out.len().checked_sub(LANES) {
+            // The last values of a profile that is not a whole number of vectors long are those of an earlier vector, too.
+            for start in (0..last).step_by(LANES).chain([last]) {
+                let mut sums = [0.0_f32; LANES];
+                for (tap, part) in taps.iter().zip(profile[start..].windows(LANES)) {
+                    for (sum, p) in sums.iter_mut().zip(part) {
+                        *sum += tap * p;
+                    }
+                }
+                out[start..start + LANES].copy_from_slice(&sums);
+            }
+        } else {
+            for (o, part) in out.iter_mut().zip(profile.windows(taps.len())) {
+                *o = taps.iter().zip(part).map(|(t, p)| t * p).sum();
+            }
+        }
+    }
+}
+
+/// Sums over part of a profile, about its middle value, so that squares of large grey levels do not cancel.
+struct Moments {
+    sum: f32,
+    squares: f32,
+    /// With the distance from the middle.
+    slope: f32,
+}
+
+/// Part of a profile of which the moments are wanted.
+struct Reduce<'a> {
+    part: &'a [f32],
+    half: usize,
+}
+
+impl WithSimd for Reduce<'_> {
+    type Output = Moments;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Moments {
+        let Self { part, half } = self;
+        let base = part[half];
+        let (mut sum, mut squares, mut slope) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
+        for (n, values) in part.chunks(LANES).enumerate() {
+            let mut lanes = [base; LANES];
+            lanes[..values.len()].copy_from_slice(values);
+            let first = (n * LANES) as f32 - half as f32;
+            for k in 0..LANES {
+                let p = lanes[k] - base;
+                sum[k] += p;
+                squares[k] += p * p;
+                slope[k] += (first + k as f32) * p;
+            }
+        }
+        let [sum, squares, slope] = [sum, squares, slope].map(|lanes| lanes.iter().sum());
+        Moments { sum, squares, slope }
+    }
+}
+
+/// Standard deviation, px, of what pixels this large, which are means of others, and linear interpolation between them spread beyond what single pixels do.
+fn spread_of_means(step_px: f64) -> f64 {
+    (0.25 * (step_px * step_px - 1.0)).max(0.0).sqrt()
 }
 
 /// Standard normal distribution, to 1e-7 (Abramowitz and Stegun 26.2.17).
@@ -201,7 +279,8 @@ mod tests {
         for k in -half..=half {
             // The normal distribution is good to 1e-7, the mean of 200 places to their distance squared.
             let expected = places(k) - mean;
-            assert!((f64::from(taps[(k + half) as usize]) - expected).abs() < 1e-4, "{k}");
+            let tap = f64::from(taps[(k + half) as usize] * kernel.energy);
+            assert!((tap - expected).abs() < 1e-4, "{k}");
         }
     }
 

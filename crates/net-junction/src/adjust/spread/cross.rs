@@ -5,7 +5,7 @@ use net_geometry::nalgebra::Vector2;
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, median};
 use crate::adjust::locate::{reach_px, vertex};
-use crate::adjust::profile::{COARSE_PX, Source};
+use crate::adjust::source::Source;
 use crate::adjust::spread::{FEWEST, REACH, Spreader};
 use crate::adjust::template::Look;
 
@@ -118,16 +118,16 @@ impl Spreader {
         let edge = graph.edge_from(k, family)?;
         let reach = f64::from(reach_px(graph, edge, config.search_cells[0]));
         let width = (look.twine_m * node.scale).max(0.15);
-        let half = (look.window_px(width, node.spacing[family], family) / COARSE_PX).round() as usize;
+        let half = (look.window_px(width, node.spacing[family], family) / look.coarse_px).round() as usize;
         let kernel = self.kernels.get(width, look.spread_px, look.blur_px[family], half);
-        let steps = (reach / COARSE_PX).ceil() as usize + 1;
+        let steps = (reach / look.coarse_px).ceil() as usize + 1;
         self.profile.clear();
         self.profile.resize(2 * (steps + kernel.half()) + 1, 0.0);
         let mut inside = [true];
         source.profiles(
             [middle - arm, middle + arm],
             [0.0; 2],
-            COARSE_PX,
+            look.coarse_px,
             &mut inside,
             &mut self.sums,
             &mut self.profile,
@@ -146,7 +146,7 @@ impl Spreader {
         let sign = like.signum();
         let mut best = (steps, 0.0_f32);
         for (n, a) in self.responses.iter().enumerate() {
-            let q = (n as f64 - steps as f64) * COARSE_PX;
+            let q = (n as f64 - steps as f64) * look.coarse_px;
             let near = if q.abs() > reach { 0.0 } else { 1.0 / (1.0 + (0.5 * q / reach).powi(2)) };
             if a * sign * near as f32 > best.1 {
                 best = (n, a * sign * near as f32);
@@ -158,7 +158,7 @@ impl Spreader {
         }
         let n = best.0.clamp(1, 2 * steps - 1);
         let part = vertex([n - 1, n, n + 1].map(|m| self.responses[m] * sign));
-        let q = (n as f64 - steps as f64 + f64::from(part)) * COARSE_PX;
+        let q = (n as f64 - steps as f64 + f64::from(part)) * look.coarse_px;
         Some((normal, q, self.responses[best.0], 0.9 * reach))
     }
 }
