@@ -21,7 +21,7 @@ const BLUR_CELLS: f64 = 0.6;
 /// Share of the variance that motion must explain on top.
 const BLUR_GAIN: f32 = 0.1;
 /// Twines on which the diameter is tried.
-const FIT_TWINES: usize = 250;
+const FIT_TWINES: usize = 150;
 
 /// Measured offsets of all bins; keeps its buffers.
 #[derive(Debug, Default)]

@@ -7,7 +7,7 @@ use crate::adjust::source::{END, Source};
 pub(crate) const COARSE_PX: f64 = 1.0;
 pub(crate) const FINE_PX: f64 = 0.5;
 /// Cells from this size on, px, are looked for in steps of twice as much, and so on: in pictures of half the size.
-const HALVED_CELL_PX: f64 = 24.0;
+const HALVED_CELL_PX: f64 = 18.0;
 /// Longest steps, px.
 const COARSEST_PX: f64 = 4.0;
 /// Length of a bin along the twine, px, to find it and to measure it.

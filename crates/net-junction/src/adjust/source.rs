@@ -148,6 +148,7 @@ impl Level {
     #[inline(always)]
     fn add_places(&self, place: impl Fn(i32) -> [i32; 2], out: &mut [i32]) {
         let (width, squares) = (self.squares.width() as i32, self.squares.data());
+        let Some(last) = squares.len().checked_sub(1) else { return };
         for (line, out) in out.chunks_mut(LINE).enumerate() {
             let first = (line * LINE) as i32;
             // One after the other, for the first and the last of these loops become vectors.
@@ -158,7 +159,7 @@ impl Level {
                 *at = (y >> 16).wrapping_mul(width).wrapping_add(x >> 16);
             }
             for at in found.iter_mut() {
-                *at = squares.get(*at as usize).copied().unwrap_or_default() as i32;
+                *at = squares[(*at as usize).min(last)] as i32;
             }
             for (k, (out, &square)) in (first..).zip(out.iter_mut().zip(&*found)) {
                 let [x, y] = place(k);

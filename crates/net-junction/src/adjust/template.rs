@@ -203,18 +203,20 @@ impl WithSimd for Reduce<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Moments {
         let Self { part, half } = self;
         let base = part[half];
+        let (vectors, left) = part.as_chunks::<LANES>();
         let (mut sum, mut squares, mut slope) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
-        for (n, values) in part.chunks(LANES).enumerate() {
-            let mut lanes = [base; LANES];
-            lanes[..values.len()].copy_from_slice(values);
-            let first = (n * LANES) as f32 - half as f32;
-            for k in 0..LANES {
-                let p = lanes[k] - base;
-                sum[k] += p;
-                squares[k] += p * p;
-                slope[k] += (first + k as f32) * p;
-            }
+        let mut add = |first: usize, values: [f32; LANES]| {
+            let first = first as f32 - half as f32;
+            sum.iter_mut().zip(values).for_each(|(s, p)| *s += p);
+            squares.iter_mut().zip(values).for_each(|(s, p)| *s += p * p);
+            slope.iter_mut().zip(values).enumerate().for_each(|(k, (s, p))| *s += (first + k as f32) * p);
+        };
+        for (n, values) in vectors.iter().enumerate() {
+            add(n * LANES, values.map(|p| p - base));
         }
+        let mut last = [0.0; LANES];
+        last.iter_mut().zip(left).for_each(|(l, p)| *l = p - base);
+        add(vectors.len() * LANES, last);
         let [sum, squares, slope] = [sum, squares, slope].map(|lanes| lanes.iter().sum());
         Moments { sum, squares, slope }
     }
