@@ -8,7 +8,8 @@
 use nalgebra::{Matrix2, Vector2};
 use wide::i16x8;
 
-use crate::zncc::{LANES, Zncc, push_rounded, sum_of};
+use crate::lanes::{LANES, push_rounded, sum_of};
+use crate::zncc::Zncc;
 
 /// Steps below this change nothing, px.
 const SMALL_STEP_PX: f64 = 0.002;

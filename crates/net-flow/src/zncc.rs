@@ -8,18 +8,13 @@ use nalgebra::{Matrix2, Vector2};
 use net_image::GrayView;
 use wide::{i16x8, i32x4};
 
+use crate::lanes::{LANES, STEPS, correlate, push_rounded, sum_of};
+use crate::patch::{WARP_STRIDE, sample_patch};
+
 /// Largest half width of a template, px.
 pub(crate) const MAX_HALF: usize = 31;
 /// Largest search radius, px.
 pub(crate) const MAX_RADIUS: usize = 24;
-/// Lanes of one product.
-pub(crate) const LANES: usize = 8;
-/// Steps of the template per grey level.
-const STEPS: f32 = 16.0;
-/// Rounds a small f32 to a whole number when added.
-const ROUNDER: f32 = 12_582_912.0;
-/// Row length, px, of the part of the picture that a stretched template is sampled from.
-const WARP_STRIDE: usize = 128;
 /// A template of less variance, grey levels squared, shows nothing.
 const FLAT_VARIANCE: f64 = 0.5;
 
@@ -266,58 +261,6 @@ impl Zncc {
     }
 }
 
-/// Rounds a row of at most 63 values to steps and appends it, padded with zeros to whole lanes.
-pub(crate) fn push_rounded(row: &[f32], out: &mut Vec<i16x8>) {
-    let mut padded = [0.0f32; 2 * MAX_HALF + 2];
-    padded[..row.len()].copy_from_slice(row);
-    for chunk in padded.as_chunks::<LANES>().0.iter().take(row.len().div_ceil(LANES)) {
-        // |x| <= 255: adding 1.5 * 2^23 leaves the rounded number in the low bits of the sum.
-        out.push(i16x8::from(chunk.map(|x| (x * STEPS + ROUNDER).to_bits() as i16)));
-    }
-}
-
-/// Sum in eight lanes.
-pub(crate) fn sum_of(values: &[f32]) -> f32 {
-    let (chunks, rest) = values.as_chunks::<LANES>();
-    let mut lanes = [0.0f32; LANES];
-    for chunk in chunks {
-        lanes.iter_mut().zip(chunk).for_each(|(lane, x)| *lane += x);
-    }
-    lanes.iter().sum::<f32>() + rest.iter().sum::<f32>()
-}
-
-/// Sum of products of a template (rows of `row_lanes`) with the window that starts at `window[0]`.
-#[inline]
-pub(crate) fn correlate(template: &[i16x8], row_lanes: usize, window: &[i16], stride: usize) -> i64 {
-    match row_lanes {
-        1 => correlate_rows::<1>(template, window, stride),
-        2 => correlate_rows::<2>(template, window, stride),
-        3 => correlate_rows::<3>(template, window, stride),
-        4 => correlate_rows::<4>(template, window, stride),
-        5 => correlate_rows::<5>(template, window, stride),
-        6 => correlate_rows::<6>(template, window, stride),
-        7 => correlate_rows::<7>(template, window, stride),
-        _ => correlate_rows::<8>(template, window, stride),
-    }
-}
-
-/// [`correlate`] of rows of `N` lanes. A lane gains at most 2 * 4080 * 128 = 1.04e6 per product, and there are 63 * 8 products: 5.3e8.
-#[inline]
-fn correlate_rows<const N: usize>(template: &[i16x8], window: &[i16], stride: usize) -> i64 {
-    let mut sum = i32x4::ZERO;
-    let (rows, _) = template.as_chunks::<N>();
-    let mut window = window;
-    for row in rows {
-        let (lanes, _) = window.as_chunks::<LANES>();
-        let Some(lanes) = lanes.first_chunk::<N>() else { break };
-        for k in 0..N {
-            sum += row[k].dot(i16x8::from(lanes[k]));
-        }
-        window = window.get(stride..).unwrap_or_default();
-    }
-    sum.to_array().into_iter().map(i64::from).sum()
-}
-
 /// Least-squares quadratic through the nine scores `at(-1..=1, -1..=1)`: offset of its maximum, px, at most one half a pixel away
 /// along each axis, and its height above `at(0, 0)`. Falls back to an axis each where the quadratic has no maximum.
 pub(crate) fn quadratic_peak(at: impl Fn(isize, isize) -> f32) -> (Vector2<f64>, f32) {
@@ -340,106 +283,6 @@ pub(crate) fn quadratic_peak(at: impl Fn(isize, isize) -> f32) -> (Vector2<f64>,
     };
     let gain = gradient.dot(&offset) + 0.5 * offset.dot(&(hessian * offset));
     (offset, gain.clamp(0.0, 0.2) as f32)
-}
-
-/// Samples `(2 half + 1)^2` values round `centre`, bilinear, edges repeated, stretched by `source_from_patch`.
-pub(crate) fn sample_patch(
-    image: GrayView<'_>,
-    centre: Vector2<f64>,
-    source_from_patch: &Matrix2<f64>,
-    half: usize,
-    warp: &mut Vec<f32>,
-    out: &mut Vec<f32>,
-) {
-    let reach = half as i64;
-    let (width, height) = (image.width() as i64, image.height() as i64);
-    let (u0, v0) = (centre.x.floor() as i64, centre.y.floor() as i64);
-    let inside = u0 - reach >= 0 && v0 - reach >= 0 && u0 + reach + 1 < width && v0 + reach + 1 < height;
-    if inside && *source_from_patch == Matrix2::identity() {
-        let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
-        let (start, side) = ((u0 - reach) as usize, 2 * half + 1);
-        out.resize(side * side, 0.0);
-        // Each row is interpolated along u once, and serves the output row above it and the one below.
-        let mut rows = [[0.0f32; 2 * MAX_HALF + 2]; 2];
-        let [above, below] = &mut rows;
-        let (mut above, mut below) = (&mut above[..side], &mut below[..side]);
-        between(&image.row((v0 - reach) as usize)[start..][..side + 1], fu, above);
-        for (v, out) in (v0 - reach + 1..).zip(out.chunks_exact_mut(side)) {
-            between(&image.row(v as usize)[start..][..side + 1], fu, below);
-            for ((out, a), b) in out.iter_mut().zip(&*above).zip(&*below) {
-                *out = a + fv * (b - a);
-            }
-            std::mem::swap(&mut above, &mut below);
-        }
-        return;
-    }
-    let m = source_from_patch.map(|x| x as f32);
-    // Fractions are taken relative to a whole pixel, so that f32 is as good in the corner of a large picture as at the origin.
-    let (fu, fv) = ((centre.x - u0 as f64) as f32, (centre.y - v0 as f64) as f32);
-    let spread = (m.abs() * Vector2::repeat(reach as f32)).map(|x| x.ceil() as i64 + 1);
-    let inside = u0 - spread.x >= 0 && v0 - spread.y >= 0 && u0 + spread.x + 1 < width && v0 + spread.y + 1 < height;
-    let rows = (2 * spread.y + 2) as usize;
-    if inside && rows <= WARP_STRIDE && 2 * spread.x + 2 <= WARP_STRIDE as i64 {
-        // The part of the picture that takes part, in rows of fixed length: one check of bounds per sample.
-        let (left, columns) = ((u0 - spread.x) as usize, (2 * spread.x + 2) as usize);
-        warp.resize((WARP_STRIDE + 1) * WARP_STRIDE, 0.0);
-        for (v, row) in (u64::try_from(v0 - spread.y).unwrap_or(0)..).zip(warp.chunks_exact_mut(WARP_STRIDE).take(rows))
-        {
-            let source = &image.row(v as usize)[left..][..columns];
-            row.iter_mut().zip(source).for_each(|(x, &s)| *x = f32::from(s));
-        }
-        let side = 2 * half + 1;
-        out.resize(side * side, 0.0);
-        let (du, dv) = (fu + spread.x as f32, fv + spread.y as f32);
-        let mut places = [(0u32, 0.0f32, 0.0f32); 2 * MAX_HALF + 1];
-        for (v, out) in (-reach..).zip(out.chunks_exact_mut(side)) {
-            let (base_u, base_v) = (du + m.m12 * v as f32, dv + m.m22 * v as f32);
-            for (u, place) in (-reach as i32..).zip(&mut places[..side]) {
-                let u = u as f32;
-                let (u, v) = (base_u + m.m11 * u, base_v + m.m21 * u);
-                // Rounds down (or to the whole number just reached): the low bits of the sum.
-                let (iu, iv) = (u - 0.5 + ROUNDER, v - 0.5 + ROUNDER);
-                let at = (iv.to_bits() & 0xffff) * WARP_STRIDE as u32 + (iu.to_bits() & 0xffff);
-                *place = (at, u - (iu - ROUNDER), v - (iv - ROUNDER));
-            }
-            for (out, &(at, fu, fv)) in out.iter_mut().zip(&places) {
-                let Some(near) = warp.get(at as usize..).and_then(|w| w.first_chunk::<{ WARP_STRIDE + 2 }>()) else {
-                    continue;
-                };
-                let (a, b) = (near[0] + fu * (near[1] - near[0]), near[WARP_STRIDE]);
-                let b = b + fu * (near[WARP_STRIDE + 1] - b);
-                *out = a + fv * (b - a);
-            }
-        }
-        return;
-    }
-    for v in -reach..=reach {
-        for u in -reach..=reach {
-            let (u, v) = (u as f32, v as f32);
-            out.push(bilinear(image, centre.x as f32 + m.m11 * u + m.m12 * v, centre.y as f32 + m.m21 * u + m.m22 * v));
-        }
-    }
-}
-
-/// Values a fraction `f` of a pixel to the right of each of a row's; the row has one more.
-fn between(row: &[u8], f: f32, out: &mut [f32]) {
-    for ((out, &a), &b) in out.iter_mut().zip(row).zip(row.iter().skip(1)) {
-        let (a, b) = (f32::from(a), f32::from(b));
-        *out = a + f * (b - a);
-    }
-}
-
-/// One bilinear sample, edges repeated. NaN samples the corner: callers have checked their points.
-#[inline]
-fn bilinear(image: GrayView<'_>, u: f32, v: f32) -> f32 {
-    let u = u.clamp(0.0, (image.width() - 1) as f32);
-    let v = v.clamp(0.0, (image.height() - 1) as f32);
-    let (u0, v0) = (u as usize, v as usize);
-    let (u1, v1) = ((u0 + 1).min(image.width() - 1), (v0 + 1).min(image.height() - 1));
-    let (fu, fv) = (u - u0 as f32, v - v0 as f32);
-    let (top, bottom) = (image.row(v0), image.row(v1));
-    let mix = |r: &[u8]| f32::from(r[u0]) * (1.0 - fu) + f32::from(r[u1]) * fu;
-    mix(top) * (1.0 - fv) + mix(bottom) * fv
 }
 
 #[cfg(test)]
