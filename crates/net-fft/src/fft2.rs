@@ -97,14 +97,20 @@ impl RealFft2 {
     /// Tells the transforms of paired rows apart, for bins `first` and on along the rows, into columns.
     fn split_rows(&self, first: usize, columns: &mut [Complex32]) {
         let half = self.height.div_ceil(2);
-        for (v, pair) in self.pairs.chunks_exact(self.width).enumerate() {
-            for (kx, column) in (first..).zip(columns.chunks_exact_mut(self.height)) {
-                // Z = A + iB, and a real row's transform is its own mirror image, conjugated.
-                let (z, m) = (pair[kx], pair[if kx == 0 { 0 } else { self.width - kx }]);
-                column[v] = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
-                if let Some(lower) = column.get_mut(v + half) {
-                    *lower = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
-                }
+        for (kx, column) in (first..).zip(columns.chunks_exact_mut(self.height)) {
+            let mirror = if kx == 0 { 0 } else { self.width - kx };
+            let (upper, lower) = column.split_at_mut(half);
+            let (mut pairs, mut upper) = (self.pairs.chunks_exact(self.width), upper.iter_mut());
+            // Z = A + iB, and a real row's transform is its own mirror image, conjugated.
+            let of_a = |z: Complex32, m: Complex32| Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
+            let of_b = |z: Complex32, m: Complex32| Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
+            for (b, (a, pair)) in lower.iter_mut().zip((&mut upper).zip(&mut pairs)) {
+                let (z, m) = (pair[kx], pair[mirror]);
+                (*a, *b) = (of_a(z, m), of_b(z, m));
+            }
+            // The last row of an odd number of rows has no partner.
+            if let Some((a, pair)) = upper.zip(pairs).next() {
+                *a = of_a(pair[kx], pair[mirror]);
             }
         }
     }

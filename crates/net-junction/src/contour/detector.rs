@@ -159,8 +159,7 @@ impl JunctionDetector {
         // No mesh has an outline longer than this; the web of twine and open water do.
         let longest = 4 * (self.width + self.height);
         tracer.trace(threshold.level(light), longest, |outline| {
-            let middle = outline.points.iter().sum::<Vector2<f64>>() / outline.points.len().max(1) as f64;
-            let mut found = shaper.judge(&outline, cell_at(middle), light, config);
+            let mut found = shaper.judge(&outline, cell_at(outline.middle), light, config);
             let good = found.verdict == Verdict::Accepted;
             if !good && !config.keep_rejected {
                 return;

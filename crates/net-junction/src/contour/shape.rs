@@ -206,7 +206,7 @@ mod tests {
 
     fn judge(corners: [(f64, f64); 4], basis: Option<Basis>, config: &Config) -> Verdict {
         let points = outline_of(corners);
-        let outline = Outline { points: &points, area: polygon_area(&points), cut: false };
+        let outline = Outline::of(&points, false);
         let area = basis.map_or(400.0, |b| b.cell_area().abs());
         Shaper::default().judge(&outline, Some(ExpectedCell { area, basis }), true, config).verdict
     }

@@ -18,8 +18,26 @@ pub(crate) struct Outline<'a> {
     pub points: &'a [Vector2<f64>],
     /// Enclosed area, px² (Green's theorem on the points).
     pub area: f64,
+    /// Mean of the points, px.
+    pub middle: Vector2<f64>,
     /// Whether the picture's end cuts the opening.
     pub cut: bool,
+}
+
+impl<'a> Outline<'a> {
+    /// The outline through `points`.
+    pub fn of(points: &'a [Vector2<f64>], cut: bool) -> Self {
+        let first = points.first().copied().unwrap_or_default();
+        // Relative to the first point: no large numbers cancel.
+        let (mut doubled_area, mut sum, mut before) = (0.0, Vector2::zeros(), Vector2::zeros());
+        for point in points {
+            let point = point - first;
+            doubled_area += before.perp(&point);
+            sum += point;
+            before = point;
+        }
+        Self { points, area: 0.5 * doubled_area, middle: first + sum / points.len().max(1) as f64, cut }
+    }
 }
 
 /// Follows outlines; keeps its buffers.
@@ -115,7 +133,7 @@ impl Tracer {
         }
         // Four turns to the right lead once round an opening, four to the left round twine inside one.
         if turns > 0 && self.points.len() <= longest {
-            visit(Outline { points: &self.points, area: polygon_area(&self.points), cut });
+            visit(Outline::of(&self.points, cut));
         }
     }
 }
