@@ -84,31 +84,76 @@ fn water_has_no_nodes() {
     }
 }
 
-#[test]
-fn a_cut_twine_is_called_missing_and_its_neighbours_present() {
-    let s = scene(1.0, 0.0, 15.0, 5.0);
-    let mut picture = s.draw();
-    // The twine from (2, 1) to (3, 1) is painted over with the water beside it.
-    let (a, b) = (s.net.pixel_at(Vector2::new(2.06, 1.0)).unwrap(), s.net.pixel_at(Vector2::new(2.94, 1.0)).unwrap());
-    let aside = s.net.pixel_at(Vector2::new(2.5, 1.5)).unwrap() - s.net.pixel_at(Vector2::new(2.5, 1.0)).unwrap();
-    for k in 0..=200 {
-        let p = a + (b - a) * (f64::from(k) / 200.0);
-        for q in -4..=4 {
-            let (u, v) = (p.x.round() as usize, (p.y + f64::from(q)).round() as usize);
-            let from = Vector2::new(u as f64, v as f64) + aside;
-            picture[v * WIDTH + u] = picture[from.y.round() as usize * WIDTH + from.x.round() as usize];
+/// The twine from (2, 1) to (3, 1) and where the water beside it is.
+struct Twine {
+    ends: [Vector2<f64>; 2],
+    aside: Vector2<f64>,
+}
+
+impl Twine {
+    fn of(s: &Scene) -> Self {
+        let at = |i: f64, j: f64| s.net.pixel_at(Vector2::new(i, j)).unwrap();
+        Self { ends: [at(2.06, 1.0), at(2.94, 1.0)], aside: at(2.5, 1.5) - at(2.5, 1.0) }
+    }
+
+    /// Paints along the twine, from and to these parts of it, and 4 px to both sides, `shift` px further down: what `grey` makes of the drawn picture there and
+    /// of the water beside.
+    fn paint(&self, drawn: &[u8], picture: &mut [u8], (from, to): (f64, f64), shift: f64, grey: impl Fn(u8, u8) -> u8) {
+        let pixel = |p: Vector2<f64>| p.y.round() as usize * WIDTH + p.x.round() as usize;
+        let [a, b] = self.ends;
+        for k in 0..=200 {
+            let p = a + (b - a) * (from + (to - from) * f64::from(k) / 200.0);
+            for q in -4..=4 {
+                let at = p + Vector2::new(0.0, f64::from(q));
+                picture[pixel(at + Vector2::new(0.0, shift))] = grey(drawn[pixel(at)], drawn[pixel(at + self.aside)]);
+            }
         }
     }
+}
+
+/// The twine's state, after all others were found not to be missing.
+fn state_of_the_twine(s: &Scene, picture: &[u8]) -> TwineState {
     let mut adjuster = NetAdjuster::new(WIDTH, HEIGHT, &AdjustConfig::default()).unwrap();
-    adjuster.adjust(view(&picture), &s.net).unwrap();
+    adjuster.adjust(view(picture), &s.net).unwrap();
+    let mut state = TwineState::Unknown;
     for twine in adjuster.twines() {
-        let cut = twine.index == (2, 1) && twine.direction == 0;
-        if cut {
-            assert_eq!(twine.state, TwineState::Missing, "{twine:?}");
+        if twine.index == (2, 1) && twine.direction == 0 {
+            state = twine.state;
         } else {
             assert_ne!(twine.state, TwineState::Missing, "{twine:?}");
         }
     }
+    state
+}
+
+#[test]
+fn a_cut_twine_is_called_missing_and_its_neighbours_present() {
+    let s = scene(1.0, 0.0, 15.0, 5.0);
+    let (drawn, mut picture) = (s.draw(), s.draw());
+    // Painted over with the water beside it.
+    Twine::of(&s).paint(&drawn, &mut picture, (0.0, 1.0), 0.0, |_, water| water);
+    assert_eq!(state_of_the_twine(&s, &picture), TwineState::Missing);
+}
+
+#[test]
+fn a_twine_beside_its_place_is_not_called_missing() {
+    let s = scene(1.0, 0.0, 15.0, 5.0);
+    // Nearer and farther off than the last search goes, 0.12 cells.
+    for cells in [0.1, 0.17, 0.23] {
+        let (drawn, mut picture) = (s.draw(), s.draw());
+        Twine::of(&s).paint(&drawn, &mut picture, (0.0, 1.0), 0.0, |_, water| water);
+        Twine::of(&s).paint(&drawn, &mut picture, (0.0, 1.0), cells * s.cell_px(), |twine, _| twine);
+        assert_ne!(state_of_the_twine(&s, &picture), TwineState::Missing, "{cells} cells off");
+    }
+}
+
+#[test]
+fn a_twine_under_a_tuft_is_overgrown_and_not_missing() {
+    let s = scene(1.0, 0.0, 15.0, 5.0);
+    let (drawn, mut picture) = (s.draw(), s.draw());
+    // Half of it gives way to something darker than the water by twice the noise of a pixel, of which hundreds are averaged.
+    Twine::of(&s).paint(&drawn, &mut picture, (0.25, 0.75), 0.0, |_, water| water.saturating_sub(6));
+    assert_eq!(state_of_the_twine(&s, &picture), TwineState::Fouled);
 }
 
 #[test]

@@ -10,13 +10,17 @@ use crate::tile::Twine;
 const GATE: f32 = 0.8;
 /// What a frame that does not call the twine present or missing may say at the most, either way: the same both ways, or faint twines would never add up.
 const DOUBTFUL: f32 = 3.0;
+/// Frames that call a twine missing for each that calls it overgrown, at least, if it is a gap. Growth must be 2.5 deviations off the water: as far as normal
+/// deviations of water come in one frame of a hundred.
+const FOULED: u32 = 5;
 
 impl Twine {
     /// Adds a frame. Frames of one look are averaged: the camera has hardly moved, and what disturbs one disturbs all.
     pub(crate) fn add(&mut self, look: &TwineLook, frame: u32, axis: Vector2<f64>, config: &Config) {
         let llr = match look.seen {
-            Seen::Hidden | Seen::Fouled => {
-                self.covered = self.covered.saturating_add(1);
+            Seen::Hidden => return,
+            Seen::Fouled => {
+                self.fouled = self.fouled.saturating_add(1);
                 return;
             }
             _ if !(look.llr.is_finite() && look.contrast > GATE) => return,
@@ -50,6 +54,12 @@ impl Twine {
         self.sum(config) / (self.looks.max(1) as f32).sqrt()
     }
 
+    /// Whether frames called it missing, and hardly any of them overgrown: a tuft of weed in its place stands out from the water in some
+    /// frames only, but in a gap one sees nothing but water in all.
+    pub fn is_gap(&self) -> bool {
+        self.missing > 0 && self.fouled.saturating_mul(FOULED) <= self.missing
+    }
+
     fn sum(&self, config: &Config) -> f32 {
         let most = config.look_max as f32;
         let mean = if self.look_frames > 0 { self.look_sum / self.look_frames as f32 } else { 0.0 };
@@ -81,13 +91,27 @@ mod tests {
     }
 
     #[test]
+    fn a_twine_that_is_now_and_then_overgrown_is_no_gap() {
+        let (config, mut twine) = (Config::default(), Twine::default());
+        assert!(!twine.is_gap());
+        for frame in 0..15 {
+            twine.add(&look(-4.0, Seen::Missing), frame, Vector2::zeros(), &config);
+        }
+        for fouled in 1..=4 {
+            twine.add(&look(-4.0, Seen::Fouled), 14 + fouled, Vector2::zeros(), &config);
+            // One frame of five is more than chance.
+            assert_eq!(twine.is_gap(), fouled < 4);
+        }
+    }
+
+    #[test]
     fn what_is_covered_or_not_to_be_told_says_nothing() {
         let (config, mut twine) = (Config::default(), Twine::default());
         twine.add(&look(-20.0, Seen::Hidden), 0, Vector2::zeros(), &config);
         twine.add(&look(-20.0, Seen::Fouled), 1, Vector2::zeros(), &config);
         twine.add(&look(f32::NAN, Seen::Missing), 2, Vector2::zeros(), &config);
         twine.add(&TwineLook { contrast: 0.5, ..look(-20.0, Seen::Missing) }, 3, Vector2::zeros(), &config);
-        assert_eq!((twine.llr(&config), twine.looks, twine.covered), (0.0, 0, 2));
+        assert_eq!((twine.llr(&config), twine.looks, twine.fouled), (0.0, 0, 1));
         // A frame in doubt counts little.
         twine.add(&look(-20.0, Seen::Unknown), 4, Vector2::zeros(), &config);
         assert_eq!(twine.llr(&config), -3.0);

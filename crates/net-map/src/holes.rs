@@ -68,7 +68,7 @@ impl<S: TileStore> Mapper<S> {
             for (place, twines) in tile.twines.iter().enumerate() {
                 for (direction, t) in twines.iter().enumerate() {
                     let llr = t.llr(&config);
-                    if f64::from(llr) < config.missing_llr && t.missing > 0 {
+                    if f64::from(llr) < config.missing_llr && t.is_gap() {
                         let frames = (t.first_missing, t.last_missing);
                         let (contrast, looks) = (t.contrast, t.looks);
                         let index = key.cell(place);

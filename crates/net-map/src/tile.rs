@@ -101,8 +101,8 @@ pub struct Twine {
     pub look_since: u32,
     /// Looks, the present one included.
     pub looks: u32,
-    /// Frames in which it was hidden, or overgrown.
-    pub covered: u32,
+    /// Frames in which it was overgrown.
+    pub fouled: u32,
     /// Frames that called it missing, and the first and the last of them.
     pub missing: u32,
     /// See `missing`.
@@ -160,7 +160,7 @@ impl Tile {
                 t.look_at[1].to_bits(),
                 t.look_since,
                 t.looks,
-                t.covered,
+                t.fouled,
                 t.missing,
                 t.first_missing,
                 t.last_missing,
@@ -200,7 +200,7 @@ impl Tile {
             look_at: [real(b, 3), real(b, 4)],
             look_since: word(b, 5),
             looks: word(b, 6),
-            covered: word(b, 7),
+            fouled: word(b, 7),
             missing: word(b, 8),
             first_missing: word(b, 9),
             last_missing: word(b, 10),

@@ -22,7 +22,7 @@ const SIGMA_MIN_PX: f64 = 0.03;
 /// above makes the upper flank of white twine bright. Thin twine does not tell.
 const SHADING: f64 = 0.12;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
-const ROUNDS: [usize; 2] = [3, 2];
+const ROUNDS: [usize; 2] = [4, 3];
 /// How often knots may lead to another prediction, and how many of them, and which part of all, must be elsewhere than it says.
 const LED: usize = 2;
 const LED_FEWEST: usize = 4;

@@ -7,6 +7,8 @@ use crate::adjust::statistic::Statistic;
 
 /// Steps that a profile may be shifted to fit its neighbours' mean: 1 px.
 pub(crate) const SHIFT: usize = 2;
+/// How far beside its line a twine is looked for before it is called missing, cells: the neighbouring one is a whole cell off.
+const BESIDE: f32 = 0.25;
 /// Part of the twine, at each end, that is the knot's: of its length, and at least so many px.
 const KNOT: (f32, f32) = (0.12, 2.0);
 
@@ -65,8 +67,10 @@ pub(crate) struct Lines {
     pub whole: Statistic,
     pub weakest: Statistic,
     pub structure: Vec<f32>,
-    /// Mean grey level there.
+    /// Mean grey level there, on the half of the width next to the line: growth is not much wider than twine.
     pub level: Vec<f32>,
+    /// First bin of the weakest half.
+    weakest_from: Vec<usize>,
     row: Vec<f32>,
 }
 
@@ -74,6 +78,8 @@ impl Lines {
     /// Amplitude of each line in parts of its template's, at the best common shift. `means` are those of the profiles.
     pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
         let Self { full, whole, weakest, structure, level, .. } = self;
+        self.weakest_from.clear();
+        self.weakest_from.resize(graph.edges.len(), 0);
         for values in [&mut full.values, &mut whole.values, &mut weakest.values, structure, level] {
             values.clear();
             values.resize(graph.edges.len(), f32::NAN);
@@ -82,6 +88,7 @@ impl Lines {
         let window = bins.len().div_ceil(2);
         let first = profiles.half - half - SHIFT;
         let width = 2 * half + 1;
+        let middle = half / 2..width - half / 2;
         for e in (0..graph.edges.len()).filter(|&e| means.inside[e]) {
             let template = appearance.template(graph.blocks.of_edge(e));
             let energy = energy(template);
@@ -102,17 +109,33 @@ impl Lines {
                 }
             }
             self.weakest.values[e] = weakest.0 / window as f32;
+            self.weakest_from[e] = weakest.1;
             let (mut structure, mut level) = (0.0, 0.0);
             for b in weakest.1..weakest.1 + window {
                 self.row.clear();
                 self.row.extend_from_slice(&profiles.row(e, b)[first + SHIFT..][..width]);
-                level += self.row.iter().sum::<f32>();
+                level += self.row[middle.clone()].iter().sum::<f32>();
                 remove_line(&mut self.row);
                 structure += (self.row.iter().map(|r| r * r).sum::<f32>() / width as f32).sqrt();
             }
             self.structure[e] = structure / window as f32;
-            self.level[e] = level / (window * width) as f32;
+            self.level[e] = level / (window * middle.len()) as f32;
         }
+    }
+}
+
+impl Lines {
+    /// The largest amplitude, in parts of the template's, that the weakest half of a line has within [`BESIDE`] cells of `height` px, as far as it was sampled.
+    pub fn elsewhere(&self, e: usize, template: &[f32], profiles: &Profiles, height: f32) -> f32 {
+        let window = middle_bins(profiles).len().div_ceil(2);
+        let bins = self.weakest_from[e]..self.weakest_from[e] + window;
+        let amplitude = |shift: usize| {
+            let sum = bins.clone().map(|b| dot(&profiles.row(e, b)[shift..][..template.len()], template)).sum::<f32>();
+            sum / (energy(template) * window as f32)
+        };
+        let middle = profiles.half - template.len() / 2;
+        let most = ((BESIDE * height / profiles.step_px as f32) as usize).min(middle);
+        (middle - most..=middle + most).map(amplitude).fold(f32::MIN, f32::max)
     }
 }
 

@@ -30,6 +30,11 @@ impl Statistic {
         }
     }
 
+    /// What is usual around a block.
+    pub fn typical(&self, block: usize) -> f32 {
+        self.typical[block]
+    }
+
     /// Blocks where most twines are gone take over what the best of their neighbours has.
     pub fn borrow(&mut self, graph: &Graph, typical: &mut Vec<f32>) {
         typical.clone_from(&self.typical);
