@@ -59,6 +59,7 @@ mod layers;
 mod likelihood;
 mod lockin;
 mod map;
+mod median;
 mod model;
 mod naming;
 mod nodes;
