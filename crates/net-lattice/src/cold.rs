@@ -26,16 +26,6 @@ const COLD: [(f64, Model); 7] = [
     (2000.0, Model::Quartic),
     (2000.0, Model::Quartic),
 ];
-/// The same for a sheet that bends within few cells: supple from the start, about the optical axis.
-const SUPPLE: [(f64, Model); 7] = [
-    (70.0, Model::Rhomb),
-    (70.0, Model::Quadratic),
-    (90.0, Model::Cubic),
-    (110.0, Model::Quartic),
-    (130.0, Model::Quartic),
-    (160.0, Model::Quartic),
-    (160.0, Model::Quartic),
-];
 /// Radii, px of an 848 x 480 px picture, within which a sheet may be fitted, and the share of the tiles there that agree if it follows the net.
 const FOCUS: [f64; 4] = [f64::INFINITY, 420.0, 300.0, 220.0];
 const FOLLOWED: f64 = 0.9;
@@ -232,34 +222,24 @@ impl Workspace {
     /// A polynomial sheet does not follow a net that bends in many ways all over the picture, and what it misses at the rim it makes up for on the axis,
     /// where range and normal are claimed. Fits it to as much about the axis as it follows.
     fn focus(&mut self, lock: &mut Lock) {
+        let place = self.scale_for(lock.surface.depth);
         let mut best = 0.0;
-        let whole = lock.surface;
         for radius in FOCUS {
-            let mut surface = whole;
+            let mut surface = lock.surface;
             if radius.is_finite() {
                 let seed = Seed { centre: self.view.centre, ..lock.seed };
                 let Some(locked) = self.lock(&surface, &[(radius, Model::Quartic); 3], seed) else { continue };
                 surface = locked;
             }
-            self.focus_on(lock, radius, surface, lock.seed, &mut best);
-            if best > FOLLOWED {
-                return;
+            self.measure_comb(&surface, place, lock.seed.looks, &Window::ALL);
+            let good = self.evidence_within(radius).good;
+            if good > best {
+                best = good;
+                (lock.focus, lock.surface) = (radius, surface);
             }
-        }
-        let mut start = lock.start;
-        let seed = Seed { centre: self.view.centre, ..self.seed(&mut start) };
-        if let Some(surface) = self.lock(&start, &SUPPLE, seed) {
-            self.focus_on(lock, FOCUS[FOCUS.len() - 1], surface, seed, &mut best);
-        }
-    }
-
-    /// Takes a sheet if more of the tiles within `radius` agree with it than `best`.
-    fn focus_on(&mut self, lock: &mut Lock, radius: f64, surface: Surface, seed: Seed, best: &mut f64) {
-        self.measure_comb(&surface, self.scale_for(surface.depth), seed.looks, &Window::ALL);
-        let good = self.evidence_within(radius).good;
-        if good > *best {
-            *best = good;
-            (lock.focus, lock.surface, lock.seed) = (radius, surface, seed);
+            if good > FOLLOWED {
+                break;
+            }
         }
     }
 

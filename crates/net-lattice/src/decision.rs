@@ -43,8 +43,6 @@ pub struct Evidence {
     pub dissent: f64,
     /// Share of the tiles in which something else than a net hides what could agree or contradict.
     pub hidden: f64,
-    /// Median magnitude of the residual phases of the fundamental per family, rad, in the tiles that are not hidden.
-    pub scatter: [f64; 2],
     /// How far the search's candidate stood above other hypotheses of its depth, standard deviations; zero in a followed picture.
     pub above: f64,
     /// Tiles about the optical axis that counted, of those there are.
@@ -119,12 +117,6 @@ impl Evidence {
                 }
             }
         }
-        for f in 0..2 {
-            scratch.clear();
-            let seen = |m: &&Measurement| m.good && within.holds(m.site.pixel) && !usual.is_some_and(|u| u.hides(m));
-            scratch.extend(measurements.iter().filter(seen).map(|m| m.phase[f].abs()));
-            e.scatter[f] = median(scratch);
-        }
         if e.tiles > 0 {
             e.v = sum.map(|s| s * f64::sqrt(2.0 / e.tiles as f64));
             e.hidden = hidden as f64 / e.tiles as f64;
@@ -166,21 +158,11 @@ impl Evidence {
         self
     }
 
-    /// What counts like the second harmonic's coherence where meshes are too small for one: a net's phases agree to hundredths of a cell wherever one
-    /// looks, those of lattices drawn by chance wander. Of studies' scenes with meshes below 7.5 px right poses have 0.04 to 0.13 rad in the median tile
-    /// (six of them, one family 0.18), patterns at random 0.13 and more (260 of `Study::Negative`). Of so many tiles that the fit, of 21 parameters at
-    /// most, cannot have done it.
-    fn steadiness(&self) -> f64 {
-        const FEWEST: usize = 40;
-        let scatter = self.scatter[0].max(self.scatter[1]);
-        if self.tiles < FEWEST { 0.0 } else { (5.0 * (0.13 - scatter) / 0.025).clamp(0.0, 5.0) }
-    }
-
     /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
     ///
-    /// A logistic rule of the second harmonic's coherence (or, of small meshes, of how steady the phases are), which counts up to a point, and of the
-    /// shares of tiles that agree by all harmonics, in all of the picture and about the optical axis, where the claim is made; less the share of strong
-    /// waves that contradict, and, of a sheet that bends, of tiles that do not agree: it can settle a cycle off where tiles are missing. Then the chances that the pattern is one of two families of twine,
+    /// A logistic rule of the second harmonic's coherence, which counts up to a point, and of the shares of tiles that agree by all harmonics, in
+    /// all of the picture and about the optical axis, where the claim is made; less the share of strong waves that contradict, and, of a sheet that bends, of
+    /// tiles that do not agree: it can settle a cycle off where tiles are missing. Then the chances that tiles about the axis bear the bend, that the pattern is one of two families of twine,
     /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker; lines at random are never quite alike), that
     /// tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were the fit's own standard deviation
     /// `tilt_sigma` (rad) true but for a factor.
@@ -188,16 +170,18 @@ impl Evidence {
     /// The weights are a logistic regression with weights of one sign on 313 scenes of the simulator's studies (`net_sim::Study`), wrong claims counted
     /// fourfold, and then made stricter by hand until none of these was claimed wrongly; see the examples `study` and `score` for what they lead to.
     pub fn probability(&self, tilt_sigma: f64) -> f64 {
-        // The second harmonic was not fitted: without it, or phases that no fit steadies so, nothing is vouched for. One deviation is what noise has. Motion
-        // blur turns its sign in one family; in both it is turned where the pattern is no twine (scales).
+        // Nothing but the second harmonic was not fitted: without one nothing is vouched for, and one deviation is what noise has. Motion blur turns its sign in
+        // one family; in both it is turned where the pattern is no twine (scales).
         let [a, b] = self.v2;
         let harmonic = (1.25 * (a.abs().min(b.abs()) - 1.0)).clamp(0.0, 5.0);
-        let second = if a < 0.0 && b < 0.0 { 0.0 } else { harmonic.max(self.steadiness()) };
+        let second = if a < 0.0 && b < 0.0 { 0.0 } else { harmonic };
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let bend_deg = self.bend.to_degrees();
         let (whole, near) = (self.comb_good.min(0.8), self.comb_near.min(0.8));
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
         let there = logistic(-8.2 + second + 7.5 * whole + 2.5 * near - 8.0 * self.dissent - 8.0 * unsettled);
+        // A sheet may bend freely where no tile says otherwise. No right pose of bent sheets in the studies has less than 0.44 of the tiles about the axis.
+        let borne = if self.bend > 0.0 { logistic((self.comb_near - 0.4) / 0.015) } else { 1.0 };
         // Knots of real nets take it down to 0.94. Where meshes are too small to show a second harmonic they show no knots either: there no right pose of the
         // studies has less than 0.97, unless noise has a tenth of the cell's power, but scales and cells at random places reach 0.92.
         let snr = self.cell_snr.max(1e-6);
@@ -208,7 +192,7 @@ impl Evidence {
         let straight = logistic((3.5 - bend_deg) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / (3.0 * tilt_sigma).max(1e-6)).powi(2)).exp();
-        there * twine * alike * straight * normal
+        there * borne * twine * alike * straight * normal
     }
 }
 
@@ -231,7 +215,6 @@ mod tests {
             cell_snr: 1000.0,
             tiles: 144,
             tiles2: 144,
-            scatter: [0.3; 2],
             ..Evidence::default()
         };
         let with = |v2: [f64; 2]| Evidence { v2, ..perfect }.probability(0.001);
@@ -240,13 +223,8 @@ mod tests {
         assert!(with([0.0, 0.0]) < ask, "meshes too small for one");
         assert!(with([0.5, 16.0]) < ask, "one family has none");
         assert!(with([-16.0, -16.0]) < ask, "turned in both");
-        let steady = |scatter: f64, tiles: usize| {
-            Evidence { v2: [0.0; 2], scatter: [0.03, scatter], tiles, ..perfect }.probability(0.001)
-        };
-        let scales = Evidence { v2: [-3.0; 2], scatter: [0.03; 2], ..perfect };
-        assert!(scales.probability(0.001) < ask, "steady, and turned in both");
-        assert!(steady(0.1, 144) > ask, "small meshes, phases that agree");
-        assert!(steady(0.15, 144) < ask, "phases of one family wander");
-        assert!(steady(0.03, 26) < ask, "so few tiles that a fit makes them agree");
+        let bent = |comb_near: f64| Evidence { v2: [16.0; 2], bend: 0.005, comb_near, ..perfect }.probability(0.001);
+        assert!(bent(0.5) > ask, "a bend that half of the tiles about the axis bear");
+        assert!(bent(0.35) < ask, "a bend that a third of them bears");
     }
 }

@@ -59,7 +59,6 @@ mod layers;
 mod likelihood;
 mod lockin;
 mod map;
-mod median;
 mod model;
 mod naming;
 mod nodes;

@@ -8,7 +8,6 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use crate::median::Median;
 use crate::numeric::{clip_level, exp2_rough, log2_rough};
 use crate::smooth::Smoother;
 use crate::view::{Site, View};
@@ -29,6 +28,8 @@ const LEAST_NOISE: f32 = 0.01;
 /// Radius, bins, from which the highest of 3 x 3 bins stands for the middle one: steps of the search's grid are constant in the logarithm,
 /// so they are wider there than a peak is.
 const POOLED: f64 = 30.0;
+/// Over which contrast is made alike, in lengths of the high-pass filter.
+const NEAR: f64 = 0.5;
 /// Bins along a side of the blocks from which the noise floor is taken.
 const FLOOR: usize = 4;
 
@@ -42,8 +43,8 @@ pub(crate) struct Bank {
     corners: Vec<[usize; 2]>,
     /// Middle of each tile.
     pub sites: Vec<Site>,
-    /// Half the side of the squares whose median is taken away, and over which contrast is made alike, full-resolution px.
-    near_px: f64,
+    /// Standard deviation, full-resolution px, of what is smooth and taken away.
+    smooth_px: f64,
     window: Vec<f32>,
     /// Whitened power, expected value 1 without a net: tile, column (fx from 0), row (fy + SIZE / 2).
     pub power: Vec<f32>,
@@ -70,7 +71,6 @@ pub(crate) struct Spectra {
     log: Vec<f32>,
     histogram: Vec<u32>,
     high: Image<f32>,
-    median: Median,
     pooled: Vec<f32>,
 }
 
@@ -86,7 +86,7 @@ impl Bank {
         length: f64,
         columns: usize,
         rows: usize,
-        near_px: f64,
+        smooth_px: f64,
     ) -> Option<Self> {
         let raw = &view.levels.get(level)?.raw;
         let scale = view.levels[level].scale;
@@ -127,7 +127,7 @@ impl Bank {
             length,
             corners,
             sites,
-            near_px,
+            smooth_px,
             window: hann,
             power: vec![1.0; n],
             coarse: vec![0.0; n],
@@ -163,7 +163,6 @@ impl Spectra {
             log: Vec::new(),
             histogram: Vec::new(),
             high: Image::default(),
-            median: Median::default(),
             pooled: Vec::new(),
         }
     }
@@ -171,8 +170,8 @@ impl Spectra {
     /// Fills the bank's spectra from the picture in the view.
     pub(crate) fn compute(&mut self, view: &View, bank: &mut Bank, smoother: &mut Smoother) {
         let level = &view.levels[bank.level];
-        let near = bank.near_px / level.scale;
-        self.median.subtract(&level.raw, near.round() as usize, &mut self.high);
+        smoother.subtract_blur(&level.raw, (bank.smooth_px / level.scale) as f32, &mut self.high);
+        let near = NEAR * bank.smooth_px / level.scale;
         smoother.equalize(&mut self.high, near as f32, &mut self.histogram);
         let clip = clip_level(self.high.data().iter().copied(), &mut self.histogram).max(1e-9);
         let gain = 1.0 / clip;

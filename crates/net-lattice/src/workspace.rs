@@ -116,11 +116,11 @@ impl Workspace {
         let mut banks = Vec::new();
         let reduction = view.reduction as f64;
         // Tiles of 160 px for cells up to 60 px, of 360 px for those up to 136 px (848 x 480 px).
-        for (half, length, columns, rows, near) in [(0, 160.0, 9, 5, 5.0), (1, 360.0, 5, 2, 12.0)] {
+        for (half, length, columns, rows, smooth) in [(0, 160.0, 9, 5, 10.0), (1, 360.0, 5, 2, 24.0)] {
             let level = half.min(view.levels.len() - 1);
             let scale = view.levels[level].scale;
             let tile = length * view.size / scale;
-            if let Some(bank) = Bank::new(camera, &view, level, tile, columns, rows, near * view.size) {
+            if let Some(bank) = Bank::new(camera, &view, level, tile, columns, rows, smooth * view.size) {
                 let side = bank.length as f64 * scale;
                 let smallest = if half == 0 { SMALLEST_CELL * reduction } else { 0.075 * side };
                 let largest = 0.378 * side;
