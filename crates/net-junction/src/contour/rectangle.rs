@@ -58,51 +58,6 @@ fn half_hull<'a>(ordered: impl Iterator<Item = &'a Vector2<f64>>, hull: &mut Vec
     hull.pop();
 }
 
-/// Convex hull of a closed outline that does not cross itself, in the sense from u to v, into `hull` (cleared first): every point is met once, none is
-/// sorted (Melkman 1987). `deque` is scratch. Fewer than three hull points mean that the points lie on a line.
-pub(crate) fn outline_hull(outline: &[Vector2<f64>], deque: &mut Vec<Vector2<f64>>, hull: &mut Vec<Vector2<f64>>) {
-    hull.clear();
-    let Some((&(mut a), rest)) = outline.split_first() else { return };
-    let turn = |from: Vector2<f64>, to: Vector2<f64>, p: Vector2<f64>| (to - from).perp(&(p - to));
-    // The ends of the line that the outline begins with, up to its first turn.
-    let mut b = a;
-    let Some(first) = rest.iter().position(|&p| {
-        let turns = turn(a, b, p) != 0.0;
-        if !turns && (p - b).dot(&(b - a)) >= 0.0 {
-            b = p;
-        } else if !turns && (p - a).dot(&(b - a)) < 0.0 {
-            a = p;
-        }
-        turns
-    }) else {
-        hull.extend([a, b]);
-        return;
-    };
-    // The hull of the points so far lies between `bottom` and `top`, with the newest at both ends.
-    deque.clear();
-    deque.resize(2 * outline.len() + 2, Vector2::zeros());
-    let (mut bottom, mut top) = (outline.len() - 1, outline.len() + 2);
-    let mut newest = rest[first];
-    // Its neighbours on the hull.
-    let (mut after, mut before) = if turn(a, b, newest) > 0.0 { (a, b) } else { (b, a) };
-    deque[bottom..=top].copy_from_slice(&[newest, after, before, newest]);
-    for &p in &rest[first + 1..] {
-        if turn(newest, after, p) > 0.0 && turn(before, newest, p) > 0.0 {
-            continue;
-        }
-        while bottom + 1 < top && turn(deque[bottom], deque[bottom + 1], p) <= 0.0 {
-            bottom += 1;
-        }
-        while bottom + 1 < top && turn(deque[top - 1], deque[top], p) <= 0.0 {
-            top -= 1;
-        }
-        (newest, after, before) = (p, deque[bottom], deque[top]);
-        (bottom, top) = (bottom - 1, top + 1);
-        (deque[bottom], deque[top]) = (p, p);
-    }
-    hull.extend_from_slice(&deque[bottom..top]);
-}
-
 /// The rectangle of least area around a convex polygon in the sense from u to v, by rotating calipers (Toussaint 1983):
 /// one of its sides lies on a side of the polygon. `None` for fewer than three corners or no area.
 pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {

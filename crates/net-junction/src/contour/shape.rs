@@ -5,7 +5,7 @@ use net_geometry::nalgebra::Vector2;
 use crate::contour::config::{Config, Shape};
 use crate::contour::expectation::ExpectedCell;
 use crate::contour::quadrilateral::{Quadrilateral, fit_quadrilateral};
-use crate::contour::rectangle::{min_area_parallelogram, min_area_rectangle, outline_hull};
+use crate::contour::rectangle::{convex_hull, min_area_parallelogram, min_area_rectangle};
 use crate::contour::trace::Outline;
 
 /// Why an opening was taken for a mesh of the net, or not.
@@ -68,7 +68,7 @@ impl CellBox {
 /// Buffers of this stage.
 #[derive(Debug, Default)]
 pub(crate) struct Shaper {
-    deque: Vec<Vector2<f64>>,
+    points: Vec<Vector2<f64>>,
     hull: Vec<Vector2<f64>>,
     heights: Vec<f64>,
 }
@@ -136,7 +136,8 @@ impl Shaper {
             let b2 = if basis.cell_area() > 0.0 { basis.b2 } else { -basis.b2 };
             return fit_quadrilateral(outline, basis.b1, b2);
         }
-        outline_hull(outline, &mut self.deque, &mut self.hull);
+        outward_turns(outline, &mut self.points);
+        convex_hull(&mut self.points, &mut self.hull);
         match config.shape {
             Shape::Rectangle => {
                 min_area_rectangle(&self.hull).map(|r| Quadrilateral { corners: r.corners(), rms: 0.0 })
@@ -146,6 +147,19 @@ impl Shaper {
                 fit_quadrilateral(outline, half1, half2)
             }
         }
+    }
+}
+
+/// The points of an outline where it does not turn inwards, into `points` (cleared first). It does not cross itself, so they have the same hull as all.
+fn outward_turns(outline: &[Vector2<f64>], points: &mut Vec<Vector2<f64>>) {
+    points.clear();
+    let &[.., before, here] = outline else { return };
+    let (mut before, mut here) = (before, here);
+    for &after in outline {
+        if (here - before).perp(&(after - here)) >= 0.0 {
+            points.push(here);
+        }
+        (before, here) = (here, after);
     }
 }
 
@@ -192,7 +206,6 @@ mod tests {
 
     use super::*;
     use crate::contour::level::Level;
-    use crate::contour::rectangle::convex_hull;
     use crate::contour::trace::{Tracer, polygon_area};
 
     fn outline_of(corners: [(f64, f64); 4]) -> Vec<Vector2<f64>> {
@@ -247,15 +260,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_hull_of_any_outline_is_that_of_its_points(
+        fn the_outward_turns_of_any_outline_have_its_hull(
             width in 1_usize..20,
             // Zeros are many: there several points of an outline fall on one pixel.
             levels in prop::collection::vec(-3_i16..3, 20 * 16),
         ) {
             let level = Level::from_fn(width, 16, |u, v| levels[v * width + u]);
-            let (mut deque, mut hull, mut all) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut points, mut hull, mut all) = (Vec::new(), Vec::new(), Vec::new());
             Tracer::default().trace(&level, usize::MAX, |outline| {
-                outline_hull(outline.points, &mut deque, &mut hull);
+                outward_turns(outline.points, &mut points);
+                convex_hull(&mut points, &mut hull);
                 convex_hull(&mut outline.points.to_vec(), &mut all);
                 // Rounding of coordinates below 20 px.
                 assert!((polygon_area(&hull) - polygon_area(&all)).abs() < 1e-9, "{hull:?} is not {all:?}");
