@@ -185,9 +185,12 @@ impl Evidence {
         // Knots of real nets take it down to 0.94. Where meshes are too small to show a second harmonic they show no knots either: there no right pose of the
         // studies has less than 0.97, unless noise has a tenth of the cell's power, but scales and cells at random places reach 0.92.
         let snr = self.cell_snr.max(1e-6);
-        let twine = logistic((self.separable - (0.955 - 0.027 * harmonic - 0.5 / snr)) / 0.01);
-        // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well.
-        let limit = (0.01 + 0.2 * self.balance).min(0.02 + 1.5 / snr).min(0.1);
+        let least = (0.955 - 0.027 * harmonic - 0.5 / snr).max(0.82);
+        let twine = logistic((self.separable - least) / 0.01);
+        // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well, and so
+        // do the pixels of a clean net; where there is hardly a second harmonic cells must be more alike.
+        let differs = 0.02 + 0.006 * harmonic + (1.5 - 0.06 * harmonic) / snr;
+        let limit = (0.01 + 0.2 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
         let straight = logistic((3.5 - bend_deg) / 0.4);
         // Rayleigh, both axes alike. Where sheets are bent, errors are up to three times what the covariance says.
