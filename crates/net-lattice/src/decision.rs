@@ -188,8 +188,9 @@ impl Evidence {
         let least = (0.955 - 0.027 * harmonic - 0.5 / snr).max(0.82);
         let twine = logistic((self.separable - least) / 0.01);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well, and so
-        // do the pixels of a clean net; where there is hardly a second harmonic cells must be more alike.
-        let differs = 0.02 + 0.006 * harmonic + (1.5 - 0.06 * harmonic) / snr;
+        // do the pixels of a clean net, whose second harmonic is strong; where it is not, cells must be more alike.
+        let strong = ((a.abs().min(b.abs()) - 5.0) / 5.0).clamp(0.0, 1.0);
+        let differs = 0.02 + 0.03 * strong + (1.5 - 0.3 * strong) / snr;
         let limit = (0.01 + 0.2 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
         let straight = logistic((3.5 - bend_deg) / 0.4);
