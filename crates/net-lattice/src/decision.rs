@@ -162,7 +162,8 @@ impl Evidence {
     ///
     /// A logistic rule of the second harmonic's coherence, which counts up to a point, and of the shares of tiles that agree by all harmonics, in
     /// all of the picture and about the optical axis, where the claim is made; less the share of strong waves that contradict, and, of a sheet that bends, of
-    /// tiles that do not agree: it can settle a cycle off where tiles are missing. Then the chances that tiles about the axis bear the bend, that the pattern is one of two families of twine,
+    /// tiles that do not agree: it can settle a cycle off where tiles are missing. Then the chances that the tiles about the axis bear the bend, that the
+    /// pattern is one of two families of twine,
     /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker; lines at random are never quite alike), that
     /// tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were the fit's own standard deviation
     /// `tilt_sigma` (rad) true but for a factor.
@@ -173,7 +174,8 @@ impl Evidence {
         // Nothing but the second harmonic was not fitted: without one nothing is vouched for, and one deviation is what noise has. Motion blur turns its sign in
         // one family; in both it is turned where the pattern is no twine (scales).
         let [a, b] = self.v2;
-        let harmonic = (1.25 * (a.abs().min(b.abs()) - 1.0)).clamp(0.0, 5.0);
+        let weaker = a.abs().min(b.abs());
+        let harmonic = (1.25 * (weaker - 1.0)).clamp(0.0, 5.0);
         let second = if a < 0.0 && b < 0.0 { 0.0 } else { harmonic };
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let bend_deg = self.bend.to_degrees();
@@ -189,7 +191,7 @@ impl Evidence {
         let twine = logistic((self.separable - least) / 0.01);
         // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well, and so
         // do the pixels of a clean net, whose second harmonic is strong; where it is not, cells must be more alike.
-        let strong = ((a.abs().min(b.abs()) - 5.0) / 5.0).clamp(0.0, 1.0);
+        let strong = ((weaker - 5.0) / 5.0).clamp(0.0, 1.0);
         let differs = 0.02 + 0.03 * strong + (1.5 - 0.3 * strong) / snr;
         let limit = (0.01 + 0.2 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);

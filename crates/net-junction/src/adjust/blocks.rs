@@ -68,18 +68,23 @@ impl Blocks {
         &self.members[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Where among the members those of the same family in a block and around it are.
-    fn runs(&self, block: usize) -> [Range<usize>; 3] {
+    /// A block and those of the same family around it: up to three runs of blocks.
+    fn around(&self, block: usize) -> [Range<usize>; 3] {
         let (row, column) = (block % self.rows, block / self.rows % self.columns);
         let family = block / (self.rows * self.columns);
         let (low, high) = (row.saturating_sub(1), (row + 1).min(self.rows - 1));
         [-1_isize, 0, 1].map(|d| match column.checked_add_signed(d).filter(|&c| c < self.columns) {
             Some(column) => {
                 let line = (family * self.columns + column) * self.rows;
-                self.starts[line + low] as usize..self.starts[line + high + 1] as usize
+                line + low..line + high + 1
             }
             None => 0..0,
         })
+    }
+
+    /// Where among the members those in a run of blocks are.
+    fn members_of(&self, blocks: Range<usize>) -> Range<usize> {
+        self.starts[blocks.start] as usize..self.starts[blocks.end] as usize
     }
 
     /// For each block the sum of its members' rows of `width` values, of those that have one.
@@ -97,15 +102,8 @@ impl Blocks {
     pub fn sum_around(&self, block: usize, width: usize, sums: &[f32], out: &mut Vec<f32>) {
         out.clear();
         out.resize(width, 0.0);
-        let (row, column) = (block % self.rows, block / self.rows % self.columns);
-        for column in [-1_isize, 0, 1].into_iter().filter_map(|d| column.checked_add_signed(d)) {
-            if column >= self.columns {
-                continue;
-            }
-            let line = (block / (self.rows * self.columns) * self.columns + column) * self.rows;
-            for near in line + row.saturating_sub(1)..=line + (row + 1).min(self.rows - 1) {
-                out.iter_mut().zip(&sums[near * width..][..width]).for_each(|(o, s)| *o += s);
-            }
+        for near in self.around(block).into_iter().flatten() {
+            out.iter_mut().zip(&sums[near * width..][..width]).for_each(|(o, s)| *o += s);
         }
     }
 
@@ -132,7 +130,7 @@ impl Blocks {
         for block in 0..self.count() {
             scratch.clear();
             if !self.members(block).is_empty() {
-                self.runs(block).into_iter().for_each(|run| scratch.extend_from_slice(&keys[run]));
+                self.around(block).into_iter().for_each(|run| scratch.extend_from_slice(&keys[self.members_of(run)]));
             }
             let middle = median_key(&mut scratch).or_else(|| {
                 *overall.get_or_insert_with(|| {

@@ -19,7 +19,7 @@ const LANES: usize = 8;
 const LINE: usize = 32;
 
 /// A picture, ready for bilinear samples, and the same at half and a quarter of its size.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Source {
     levels: [Level; 3],
     arch: Arch,
@@ -31,12 +31,6 @@ pub(crate) struct Source {
 struct Level {
     image: Image<u8>,
     squares: Image<u32>,
-}
-
-impl Default for Source {
-    fn default() -> Self {
-        Self { levels: Default::default(), arch: Arch::new() }
-    }
 }
 
 impl Source {

@@ -21,4 +21,3 @@ pub use detector::JunctionDetector;
 pub use expectation::{CellArea, Expectation, ExpectedNet};
 pub use rectangle::{Rectangle, convex_hull, min_area_parallelogram, min_area_rectangle};
 pub use shape::{CellBox, Verdict};
-pub use trace::polygon_area;

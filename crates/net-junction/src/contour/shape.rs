@@ -206,7 +206,7 @@ mod tests {
 
     use super::*;
     use crate::contour::level::Level;
-    use crate::contour::trace::{Tracer, polygon_area};
+    use crate::contour::trace::Tracer;
 
     fn outline_of(corners: [(f64, f64); 4]) -> Vec<Vector2<f64>> {
         let corners = corners.map(|(x, y)| Vector2::new(x, y));
@@ -272,7 +272,8 @@ mod tests {
                 convex_hull(&mut points, &mut hull);
                 convex_hull(&mut outline.points.to_vec(), &mut all);
                 // Rounding of coordinates below 20 px.
-                assert!((polygon_area(&hull) - polygon_area(&all)).abs() < 1e-9, "{hull:?} is not {all:?}");
+                let area = |polygon: &[Vector2<f64>]| Outline::of(polygon, false).area;
+                assert!((area(&hull) - area(&all)).abs() < 1e-9, "{hull:?} is not {all:?}");
             });
         }
     }

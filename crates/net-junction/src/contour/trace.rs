@@ -138,13 +138,6 @@ impl Tracer {
     }
 }
 
-/// Area of a polygon, px², positive in the sense from u to v (Green's theorem).
-pub fn polygon_area(points: &[Vector2<f64>]) -> f64 {
-    let Some(&first) = points.first() else { return 0.0 };
-    // Relative to the first point: no large numbers cancel.
-    points.windows(2).map(|w| (w[0] - first).perp(&(w[1] - first))).sum::<f64>() * 0.5
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
