@@ -234,10 +234,15 @@ fn thin_out(members: &mut [u32], points: &[Vector2<f64>]) -> usize {
     loop {
         let middle = members[..kept].iter().map(|&k| points[k as usize]).sum::<Vector2<f64>>() / kept.max(1) as f64;
         let distance = |k: u32| (points[k as usize] - middle).norm_squared();
+        // Those of one box are side by side and stay so.
+        let shares = |m: usize| {
+            let same = |o: usize| members[o] / 4 == members[m] / 4;
+            (m > 0 && same(m - 1)) || (m + 1 < kept && same(m + 1))
+        };
         // The farthest among those that share their box; if none does, among all.
         let worst = |shared: bool| {
             (0..kept)
-                .filter(|&m| !shared || (0..kept).any(|o| o != m && members[o] / 4 == members[m] / 4))
+                .filter(|&m| !shared || shares(m))
                 .max_by(|&a, &b| distance(members[a]).total_cmp(&distance(members[b])))
         };
         match worst(true).or_else(|| if kept > 4 { worst(false) } else { None }) {

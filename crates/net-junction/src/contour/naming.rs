@@ -42,6 +42,8 @@ pub(crate) struct Namer {
     /// Knots of the island at hand.
     island: Vec<u32>,
     named: Vec<u32>,
+    /// Squared distance of each box from the nearest named knot, px²; before any is named, from the middle.
+    apart: Vec<f64>,
     by_index: Vec<(Index, u32)>,
     doubtful: Vec<u32>,
     /// Squared distance from the middle, px², and name less the pose's lattice coordinates.
@@ -87,13 +89,16 @@ impl Namer {
         self.visited.resize(boxes.len(), false);
         self.named.clear();
         self.list_corners(knots.len(), knot_of_corner);
-        while let Some(seed) = self.next_seed(boxes, knots, knot_of_corner, middle) {
+        self.apart.clear();
+        self.apart.extend(boxes.iter().map(|found| (found.centre() - middle).norm_squared()));
+        while let Some(seed) = self.next_seed(knot_of_corner) {
             let basis = match net.and_then(|n| n.basis_at(boxes[seed].centre())) {
                 Some(basis) => basis,
                 None => self.basis_near(seed, boxes, knots),
             };
             self.walk(seed, basis, boxes, knot_of_corner);
             if self.named.is_empty() || self.join(boxes, knots, net, seed) {
+                self.come_nearer(boxes, knots);
                 self.named.extend_from_slice(&self.island);
             } else {
                 for &k in &self.island {
@@ -136,29 +141,25 @@ impl Namer {
     }
 
     /// The opening nearest to the middle, then the one nearest to what is named already: islands are joined from near to far.
-    fn next_seed(
-        &self,
-        boxes: &[CellBox],
-        knots: &[Knot],
-        knot_of_corner: &[Option<u32>],
-        middle: Vector2<f64>,
-    ) -> Option<usize> {
-        let mut best: Option<(f64, usize)> = None;
-        for (b, found) in boxes.iter().enumerate() {
-            if self.visited[b] || knot_of_corner[4 * b..4 * b + 4].iter().all(Option::is_none) {
-                continue;
-            }
+    fn next_seed(&self, knot_of_corner: &[Option<u32>]) -> Option<usize> {
+        let (corners, _) = knot_of_corner.as_chunks::<4>();
+        let open = self.visited.iter().zip(corners).zip(&self.apart).enumerate();
+        let open = open.filter(|(_, ((visited, corners), _))| !**visited && corners.iter().any(Option::is_some));
+        open.min_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b)).map(|(b, _)| b)
+    }
+
+    /// Lowers the boxes' distances to those from the island's knots.
+    fn come_nearer(&mut self, boxes: &[CellBox], knots: &[Knot]) {
+        if self.named.is_empty() {
+            self.apart.fill(f64::MAX);
+        }
+        for ((apart, found), _) in self.apart.iter_mut().zip(boxes).zip(&self.visited).filter(|(_, visited)| !**visited)
+        {
             let centre = found.centre();
-            let distance = if self.named.is_empty() {
-                (centre - middle).norm_squared()
-            } else {
-                self.nearest_named(centre, knots).map_or(f64::MAX, |(d, _)| d)
-            };
-            if best.is_none_or(|(least, _)| distance < least) {
-                best = Some((distance, b));
+            for &k in &self.island {
+                *apart = apart.min((knots[k as usize].pixel - centre).norm_squared());
             }
         }
-        best.map(|(_, b)| b)
     }
 
     fn nearest_named(&self, at: Vector2<f64>, knots: &[Knot]) -> Option<(f64, u32)> {
