@@ -165,8 +165,8 @@ impl JunctionDetector {
                 return;
             }
             if config.keep_outlines {
-                found.outline = (outlines.len(), outline.points.len());
-                outlines.extend_from_slice(outline.points);
+                found.outline = (outlines.len(), outline.crossings.len());
+                outlines.extend(outline.pixels());
             }
             if good { accepted.push(found) } else { rejected.push(found) }
         });

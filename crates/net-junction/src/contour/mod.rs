@@ -8,6 +8,7 @@ mod detector;
 mod expectation;
 mod level;
 mod naming;
+mod outline;
 mod quadrilateral;
 mod rectangle;
 mod shape;

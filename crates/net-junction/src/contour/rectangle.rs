@@ -39,14 +39,14 @@ pub(crate) fn parallelogram_corners(
 pub fn convex_hull(points: &mut [Vector2<f64>], hull: &mut Vec<Vector2<f64>>) {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     hull.clear();
-    half_hull(points.iter(), hull);
-    half_hull(points.iter().rev(), hull);
+    half_hull(points.iter().copied(), hull);
+    half_hull(points.iter().rev().copied(), hull);
 }
 
 /// Appends one side of the hull of ordered points, but for its last point, which begins the other side.
-fn half_hull<'a>(ordered: impl Iterator<Item = &'a Vector2<f64>>, hull: &mut Vec<Vector2<f64>>) {
+pub(crate) fn half_hull(ordered: impl Iterator<Item = Vector2<f64>>, hull: &mut Vec<Vector2<f64>>) {
     let base = hull.len();
-    for &p in ordered {
+    for p in ordered {
         while let [.., a, b] = hull[base..] {
             if (b - a).perp(&(p - b)) > 0.0 {
                 break;
@@ -58,47 +58,46 @@ fn half_hull<'a>(ordered: impl Iterator<Item = &'a Vector2<f64>>, hull: &mut Vec
     hull.pop();
 }
 
-/// The rectangle of least area around a convex polygon in the sense from u to v, by rotating calipers (Toussaint 1983):
-/// one of its sides lies on a side of the polygon. `None` for fewer than three corners or no area.
+/// Sides of a polygon at which [`min_area_rectangle`] sets its calipers together.
+const TOGETHER: usize = 4;
+
+/// The rectangle of least area around a convex polygon in the sense from u to v, by calipers (Toussaint 1983): one of its sides lies on a side of the
+/// polygon. The calipers are not turned from side to side but set at several sides at once, which for the few corners of a mesh is quicker. `None` for fewer
+/// than three corners or no area.
 pub fn min_area_rectangle(hull: &[Vector2<f64>]) -> Option<Rectangle> {
     let n = hull.len();
     if n < 3 {
         return None;
     }
-    let next = |k: usize| if k + 1 < n { k + 1 } else { 0 };
-    // On from corner `k` while the polygon's side there runs along `direction`. At most one round: guards against a polygon that is not convex.
-    let climb = |mut k: usize, direction: Vector2<f64>| {
-        for _ in 0..n {
-            if direction.dot(&(hull[next(k)] - hull[k])) <= 0.0 {
-                break;
-            }
-            k = next(k);
-        }
-        k
-    };
+    let corner = |k: usize| hull[if k < n { k } else { k - n }];
     let mut best = None;
     let mut least = f64::INFINITY;
-    // The corners farthest along a side, across it, and back along it: each of these only ever moves on.
-    let mut farthest: Option<[usize; 3]> = None;
-    for (i, &here) in hull.iter().enumerate() {
-        // Not of unit length: lengths along and across it are so many times too long.
-        let side = hull[next(i)] - here;
-        let square = side.norm_squared();
-        // Two corners in one place, or no numbers at all.
-        if square.is_nan() || square <= 0.0 {
-            continue;
+    for first in (0..n).step_by(TOGETHER) {
+        // Not of unit length: lengths along and across them are so many times too long. After the last side comes the first again.
+        let sides: [Vector2<f64>; TOGETHER] = std::array::from_fn(|k| corner(first + k + 1) - corner(first + k));
+        let (x, y) = (sides.map(|side| side.x), sides.map(|side| side.y));
+        let [mut low, mut high, mut far] =
+            [[f64::INFINITY; TOGETHER], [-f64::INFINITY; TOGETHER], [-f64::INFINITY; TOGETHER]];
+        for p in hull {
+            for k in 0..TOGETHER {
+                let along = x[k] * p.x + y[k] * p.y;
+                let across = x[k] * p.y - y[k] * p.x;
+                // Unlike `f64::min` these are one instruction each.
+                low[k] = if along < low[k] { along } else { low[k] };
+                high[k] = if along > high[k] { along } else { high[k] };
+                far[k] = if across > far[k] { across } else { far[k] };
+            }
         }
-        let normal = Vector2::new(-side.y, side.x);
-        let ahead = climb(farthest.map_or(next(i), |[ahead, _, _]| ahead), side);
-        let across = climb(farthest.map_or(ahead, |[_, across, _]| across), normal);
-        let back = climb(farthest.map_or(across, |[_, _, back]| back), -side);
-        farthest = Some([ahead, across, back]);
-        let [high, far, low] = [side.dot(&hull[ahead]), normal.dot(&hull[across]), side.dot(&hull[back])];
-        let near = normal.dot(&here);
-        let area = (high - low) * (far - near) / square;
-        if area < least {
-            least = area;
-            best = Some((side / square, normal / square, [low, high, near, far]));
+        for (k, here) in hull[first..].iter().take(TOGETHER).enumerate() {
+            let (side, square) = (sides[k], sides[k].norm_squared());
+            let near = side.perp(here);
+            let area = (high[k] - low[k]) * (far[k] - near) / square;
+            // Neither where two corners are in one place (no number) nor where there are no numbers at all.
+            if area < least {
+                least = area;
+                let normal = Vector2::new(-side.y, side.x);
+                best = Some((side / square, normal / square, [low[k], high[k], near, far[k]]));
+            }
         }
     }
     let (side, normal, [low, high, near, far]) = best?;

@@ -4,9 +4,9 @@ use net_geometry::nalgebra::Vector2;
 
 use crate::contour::config::{Config, Shape};
 use crate::contour::expectation::ExpectedCell;
+use crate::contour::outline::{Huller, Outline};
 use crate::contour::quadrilateral::{Quadrilateral, fit_quadrilateral};
-use crate::contour::rectangle::{convex_hull, min_area_parallelogram, min_area_rectangle};
-use crate::contour::trace::Outline;
+use crate::contour::rectangle::{min_area_parallelogram, min_area_rectangle};
 
 /// Why an opening was taken for a mesh of the net, or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,8 +68,9 @@ impl CellBox {
 /// Buffers of this stage.
 #[derive(Debug, Default)]
 pub(crate) struct Shaper {
+    huller: Huller,
+    /// The outline's points, px.
     points: Vec<Vector2<f64>>,
-    hull: Vec<Vector2<f64>>,
     heights: Vec<f64>,
 }
 
@@ -91,15 +92,15 @@ impl Shaper {
             None => Verdict::NotExpected,
             Some(cell) if outline.area < config.area_min * cell.area => Verdict::TooSmall,
             Some(cell) if outline.area > config.area_max * cell.area => Verdict::TooLarge,
-            Some(cell) => self.fit(outline.points, &cell, config, &mut found),
+            Some(cell) => self.fit(outline, &cell, config, &mut found),
         };
         if found.verdict != Verdict::Accepted && found.corners[0] == found.corners[2] {
-            found.corners = bounding_box(outline.points);
+            found.corners = bounding_box(outline);
         }
         found
     }
 
-    fn fit(&mut self, outline: &[Vector2<f64>], cell: &ExpectedCell, config: &Config, found: &mut CellBox) -> Verdict {
+    fn fit(&mut self, outline: &Outline, cell: &ExpectedCell, config: &Config, found: &mut CellBox) -> Verdict {
         let Some(quad) = self.shape(outline, cell, config) else { return Verdict::NoShape };
         found.corners = quad.corners;
         if cell.basis.is_none() {
@@ -131,35 +132,25 @@ impl Shaper {
         }
     }
 
-    fn shape(&mut self, outline: &[Vector2<f64>], cell: &ExpectedCell, config: &Config) -> Option<Quadrilateral> {
-        if let (Shape::Quadrilateral, Some(basis)) = (config.shape, cell.basis) {
-            let b2 = if basis.cell_area() > 0.0 { basis.b2 } else { -basis.b2 };
-            return fit_quadrilateral(outline, basis.b1, b2);
+    fn shape(&mut self, outline: &Outline, cell: &ExpectedCell, config: &Config) -> Option<Quadrilateral> {
+        if config.shape == Shape::Quadrilateral {
+            self.points.clear();
+            self.points.extend(outline.pixels());
         }
-        outward_turns(outline, &mut self.points);
-        convex_hull(&mut self.points, &mut self.hull);
-        match config.shape {
-            Shape::Rectangle => {
-                min_area_rectangle(&self.hull).map(|r| Quadrilateral { corners: r.corners(), rms: 0.0 })
+        match (config.shape, cell.basis) {
+            (Shape::Rectangle, _) => {
+                let rectangle = min_area_rectangle(self.huller.hull(outline))?;
+                Some(Quadrilateral { corners: rectangle.corners(), rms: 0.0 })
             }
-            Shape::Quadrilateral => {
-                let (_, half1, half2) = min_area_parallelogram(&self.hull, &mut self.heights)?;
-                fit_quadrilateral(outline, half1, half2)
+            (Shape::Quadrilateral, Some(basis)) => {
+                let b2 = if basis.cell_area() > 0.0 { basis.b2 } else { -basis.b2 };
+                fit_quadrilateral(&self.points, basis.b1, b2)
+            }
+            (Shape::Quadrilateral, None) => {
+                let (_, half1, half2) = min_area_parallelogram(self.huller.hull(outline), &mut self.heights)?;
+                fit_quadrilateral(&self.points, half1, half2)
             }
         }
-    }
-}
-
-/// The points of an outline where it does not turn inwards, into `points` (cleared first). It does not cross itself, so they have the same hull as all.
-fn outward_turns(outline: &[Vector2<f64>], points: &mut Vec<Vector2<f64>>) {
-    points.clear();
-    let &[.., before, here] = outline else { return };
-    let (mut before, mut here) = (before, here);
-    for &after in outline {
-        if (here - before).perp(&(after - here)) >= 0.0 {
-            points.push(here);
-        }
-        (before, here) = (here, after);
     }
 }
 
@@ -193,33 +184,30 @@ fn against_cell(side1: Vector2<f64>, side2: Vector2<f64>, basis: net_geometry::B
     }
 }
 
-fn bounding_box(points: &[Vector2<f64>]) -> [Vector2<f64>; 4] {
-    let Some(&first) = points.first() else { return [Vector2::zeros(); 4] };
-    let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+fn bounding_box(outline: &Outline) -> [Vector2<f64>; 4] {
+    let bounds = outline.pixels().map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.inf(&p), high.sup(&p)));
+    let Some((low, high)) = bounds else { return [Vector2::zeros(); 4] };
     [low, Vector2::new(high.x, low.y), high, Vector2::new(low.x, high.y)]
 }
 
 #[cfg(test)]
 mod tests {
     use net_geometry::Basis;
-    use proptest::prelude::*;
 
     use super::*;
-    use crate::contour::level::Level;
-    use crate::contour::trace::Tracer;
+    use crate::contour::outline::Crossing;
 
-    fn outline_of(corners: [(f64, f64); 4]) -> Vec<Vector2<f64>> {
-        let corners = corners.map(|(x, y)| Vector2::new(x, y));
-        (0..4)
-            .flat_map(|k| {
-                (0..20).map(move |i| corners[k] + (corners[(k + 1) % 4] - corners[k]) * (f64::from(i) / 20.0))
-            })
-            .collect()
+    fn outline_of(corners: [(f64, f64); 4]) -> Vec<Crossing> {
+        let corners = corners.map(|(x, y)| Vector2::new(x, y) * f64::from(Crossing::PARTS));
+        let points = (0..4).flat_map(|k| {
+            (0..20).map(move |i| corners[k] + (corners[(k + 1) % 4] - corners[k]) * (f64::from(i) / 20.0))
+        });
+        points.map(|p| Crossing { x: p.x.round() as i32, y: p.y.round() as i32 }).collect()
     }
 
     fn judge(corners: [(f64, f64); 4], basis: Option<Basis>, config: &Config) -> Verdict {
-        let points = outline_of(corners);
-        let outline = Outline::of(&points, false);
+        let crossings = outline_of(corners);
+        let outline = Outline::of(&crossings, false);
         let area = basis.map_or(400.0, |b| b.cell_area().abs());
         Shaper::default().judge(&outline, Some(ExpectedCell { area, basis }), true, config).verdict
     }
@@ -256,25 +244,5 @@ mod tests {
         // A triangle fills half of its quadrilateral.
         let triangle = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (10.0, 10.0)];
         assert_ne!(judge(triangle, cell, &Config::default()), Verdict::Accepted);
-    }
-
-    proptest! {
-        #[test]
-        fn the_outward_turns_of_any_outline_have_its_hull(
-            width in 1_usize..20,
-            // Zeros are many: there several points of an outline fall on one pixel.
-            levels in prop::collection::vec(-3_i16..3, 20 * 16),
-        ) {
-            let level = Level::from_fn(width, 16, |u, v| levels[v * width + u]);
-            let (mut points, mut hull, mut all) = (Vec::new(), Vec::new(), Vec::new());
-            Tracer::default().trace(&level, usize::MAX, |outline| {
-                outward_turns(outline.points, &mut points);
-                convex_hull(&mut points, &mut hull);
-                convex_hull(&mut outline.points.to_vec(), &mut all);
-                // Rounding of coordinates below 20 px.
-                let area = |polygon: &[Vector2<f64>]| Outline::of(polygon, false).area;
-                assert!((area(&hull) - area(&all)).abs() < 1e-9, "{hull:?} is not {all:?}");
-            });
-        }
     }
 }

@@ -2,54 +2,24 @@
 //!
 //! Openings are 4-connected and twine is 8-connected, so that a twine one pixel wide closes its mesh also where it runs diagonally. The
 //! follower walks the cracks between pixels with the opening on its right and passes every crack once, so the work is
-//! proportional to the length of all borders. Each crack gives one outline point, where the level crosses zero between the two pixels.
-
-use net_geometry::nalgebra::Vector2;
+//! proportional to the length of all borders. Each crack gives one crossing, where the level passes zero between the two pixels.
 
 use crate::contour::level::{FRAME, Level};
+use crate::contour::outline::{Crossing, Outline};
 
 /// Pixels of a row that are looked at together.
 const STRIP: usize = 8;
-
-/// The closed outline of an opening.
-#[derive(Debug)]
-pub(crate) struct Outline<'a> {
-    /// Crossings of the threshold, px, in the sense from u to v.
-    pub points: &'a [Vector2<f64>],
-    /// Enclosed area, px² (Green's theorem on the points).
-    pub area: f64,
-    /// Mean of the points, px.
-    pub middle: Vector2<f64>,
-    /// Whether the picture's end cuts the opening.
-    pub cut: bool,
-}
-
-impl<'a> Outline<'a> {
-    /// The outline through `points`.
-    pub fn of(points: &'a [Vector2<f64>], cut: bool) -> Self {
-        let first = points.first().copied().unwrap_or_default();
-        // Relative to the first point: no large numbers cancel.
-        let (mut doubled_area, mut sum, mut before) = (0.0, Vector2::zeros(), Vector2::zeros());
-        for point in points {
-            let point = point - first;
-            doubled_area += before.perp(&point);
-            sum += point;
-            before = point;
-        }
-        Self { points, area: 0.5 * doubled_area, middle: first + sum / points.len().max(1) as f64, cut }
-    }
-}
 
 /// Follows outlines; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Tracer {
     /// Pixels whose left crack has been passed.
     passed: Vec<bool>,
-    points: Vec<Vector2<f64>>,
+    crossings: Vec<Crossing>,
 }
 
 impl Tracer {
-    /// Hands every opening's outer outline of at most `longest` points to `visit`, in the order of their top-left pixels.
+    /// Hands every opening's outer outline of at most `longest` crossings to `visit`, in the order of their top-left pixels.
     /// Outlines of twine inside an opening are left out.
     pub fn trace(&mut self, level: &Level, longest: usize, mut visit: impl FnMut(Outline)) {
         let (values, stride) = (level.values(), level.stride());
@@ -97,32 +67,44 @@ impl Tracer {
         let steps = [1_isize, stride as isize, -1, -(stride as isize)];
         // The frame is one pixel wide, so a step from a pixel of the picture, or one more to the side, stays inside `values`.
         let at = |pixel: usize, direction: usize| pixel.wrapping_add_signed(steps[direction]);
-        self.points.clear();
+        self.crossings.clear();
         let (mut cut, mut turns) = (false, 0);
         let (mut pixel, mut heading) = (start, 3);
+        // Levels on both sides of the crack.
+        let (mut inner, mut outer) = (values[start], values[at(start, 2)]);
         loop {
             let left = (heading + 3) & 3;
-            let outside = values[at(pixel, left)];
             if heading == 3 {
                 self.passed[pixel] = true;
             }
-            cut |= outside == FRAME;
-            if self.points.len() <= longest {
-                let (inner, outer) = (f64::from(values[pixel]), f64::from(outside));
+            cut |= outer == FRAME;
+            if self.crossings.len() <= longest {
                 // inner < 0 <= outer; the frame's level is no measurement.
-                let part = if outside == FRAME { 0.5 } else { inner / (inner - outer) };
-                let (du, dv) = (f64::from(along_u[left]), f64::from(along_v[left]));
-                self.points.push(Vector2::new(f64::from(u) + du * part, f64::from(v) + dv * part));
+                let (inner, outer) = (i32::from(inner), i32::from(outer));
+                let part = if outer == i32::from(FRAME) {
+                    Crossing::PARTS / 2
+                } else {
+                    inner * Crossing::PARTS / (inner - outer)
+                };
+                let (x, y) = (u * Crossing::PARTS + along_u[left] * part, v * Crossing::PARTS + along_v[left] * part);
+                self.crossings.push(Crossing { x, y });
             }
             let ahead = at(pixel, heading);
-            if values[ahead] >= 0 {
+            let in_front = values[ahead];
+            if in_front >= 0 {
+                outer = in_front;
                 heading = (heading + 1) & 3;
                 turns += 1;
             } else {
-                (pixel, u, v) = (ahead, u + along_u[heading], v + along_v[heading]);
                 let aside = at(ahead, left);
-                if values[aside] < 0 {
-                    (pixel, u, v) = (aside, u + along_u[left], v + along_v[left]);
+                let beside = values[aside];
+                (u, v) = (u + along_u[heading], v + along_v[heading]);
+                if beside >= 0 {
+                    (pixel, inner, outer) = (ahead, in_front, beside);
+                } else {
+                    // Round the corner of the same pixel of twine.
+                    (pixel, inner) = (aside, beside);
+                    (u, v) = (u + along_u[left], v + along_v[left]);
                     heading = left;
                     turns -= 1;
                 }
@@ -132,8 +114,8 @@ impl Tracer {
             }
         }
         // Four turns to the right lead once round an opening, four to the left round twine inside one.
-        if turns > 0 && self.points.len() <= longest {
-            visit(Outline::of(&self.points, cut));
+        if turns > 0 && self.crossings.len() <= longest {
+            visit(Outline::of(&self.crossings, cut));
         }
     }
 }
@@ -143,19 +125,20 @@ mod tests {
     use std::collections::BTreeSet;
 
     use imageproc::contours::{BorderType, find_contours};
+    use net_geometry::nalgebra::Vector2;
     use proptest::prelude::*;
 
     use super::*;
 
-    /// Level ±1 of a mask: outline points are midpoints of cracks.
+    /// Level ±1 of a mask: crossings are midpoints of cracks.
     fn level_of(mask: &[bool], width: usize) -> Level {
         Level::from_fn(width, mask.len() / width, |u, v| if mask[v * width + u] { 1 } else { -1 })
     }
 
     /// Pixels of twine across the outline's cracks.
-    fn twine_beside(points: &[Vector2<f64>], mask: &[bool], width: usize) -> BTreeSet<(u32, u32)> {
-        points
-            .iter()
+    fn twine_beside(outline: &Outline, mask: &[bool], width: usize) -> BTreeSet<(u32, u32)> {
+        outline
+            .pixels()
             .map(|p| {
                 let (a, b) = ((p.x.floor() as u32, p.y.floor() as u32), (p.x.ceil() as u32, p.y.ceil() as u32));
                 if mask[a.1 as usize * width + a.0 as usize] { a } else { b }
@@ -181,7 +164,7 @@ mod tests {
         let mut holes = Vec::new();
         Tracer::default().trace(&level_of(mask, width), usize::MAX, |outline| {
             if !outline.cut {
-                holes.push(twine_beside(outline.points, mask, width));
+                holes.push(twine_beside(&outline, mask, width));
             }
         });
         holes.sort();
@@ -259,7 +242,7 @@ mod tests {
         Tracer::default().trace(&level, usize::MAX, |outline| {
             seen += 1;
             assert!(!outline.cut);
-            for p in outline.points {
+            for p in outline.pixels() {
                 let d = (p - middle).abs();
                 // The ramp is not straight within a pixel of a corner.
                 if d.min() > half - 1.0 {
