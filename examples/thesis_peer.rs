@@ -1,6 +1,6 @@
 //! Draws pictures, times the thesis's stages on them and finds their poses: the half in Rust of `benches/peer/thesis.py`, which does the same on OpenCV.
 //!
-//! `cargo run --release --no-default-features --example thesis_peer -- FOLDER` writes `NAME.pgm` and prints lines of comma-separated fields:
+//! `cargo run --release --no-default-features --example thesis_peer -- FOLDER WIDTH HEIGHT` writes `NAME.pgm` and prints lines of comma-separated fields:
 //! `truth,NAME,range_m,nx,ny,nz`, `pose,NAME,METHOD,range_m,nx,ny,nz,probability` (empty without a net) and `time,NAME,STAGE,microseconds` (on a core).
 //! After each picture it prints `done,NAME` and waits for a line: the other half has its turn, under the same load of the machine.
 
@@ -21,6 +21,8 @@ use net_sim::{Layer, NetPose, Scene, Simulator};
 const ENOUGH_SECONDS: f64 = 0.1;
 /// So many times.
 const ROUNDS: usize = 3;
+/// Focal length, parts of the picture's width: 600 px of 848.
+const FOCAL: f64 = 600.0 / 848.0;
 /// Range, m, and tilts about x and y, degrees.
 const SCENES: [(f64, f64, f64); 12] = [
     (0.4, 0.0, 0.0),
@@ -136,8 +138,11 @@ fn time_stages(name: &str, picture: View<'_, u8>) -> Result<(), Box<dyn Error>> 
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).ok_or("which folder?")?;
-    let camera = Camera::new(600.0, 600.0, 424.0, 240.0, 848, 480, Lens::None)?;
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    let [folder, width, height] = arguments.as_slice() else { return Err("FOLDER WIDTH HEIGHT".into()) };
+    let (width, height): (u32, u32) = (width.parse()?, height.parse()?);
+    let (wide, high) = (f64::from(width), f64::from(height));
+    let camera = Camera::new(FOCAL * wide, FOCAL * wide, wide / 2.0, high / 2.0, width, height, Lens::None)?;
     let mesh = Mesh::square(0.05)?;
     let mut simulator = Simulator::new(camera);
     let mut thesis = ThesisEstimator::new(&camera, &mesh, &ThesisConfig::thesis(false))?;
@@ -150,7 +155,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let scene = Scene { layers: vec![Layer::planar(&mesh, pose)], ..Scene::default() };
         let truth = simulator.render(&scene, seed as u64, &mut picture)?;
         let axis = truth.layers.first().and_then(|layer| layer.axis).ok_or("no truth")?;
-        write_pgm(&Path::new(&folder).join(format!("{name}.pgm")), &picture)?;
+        write_pgm(&Path::new(folder).join(format!("{name}.pgm")), &picture)?;
         println!("truth,{name},{},{},{},{}", axis.range_m, axis.normal.x, axis.normal.y, axis.normal.z);
         let view = picture.view().ok_or("no picture")?;
         time_stages(&name, view)?;
