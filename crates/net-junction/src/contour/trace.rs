@@ -8,13 +8,13 @@ use crate::contour::level::{FRAME, Level};
 use crate::contour::outline::{Crossing, Outline};
 
 /// Pixels of a row that are looked at together.
-const STRIP: usize = 8;
+const STRIP: usize = 16;
 
 /// Follows outlines; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Tracer {
-    /// Pixels whose left crack has been passed.
-    passed: Vec<bool>,
+    /// -1 for pixels whose left crack has been passed, else 0.
+    passed: Vec<i8>,
     crossings: Vec<Crossing>,
 }
 
@@ -24,31 +24,25 @@ impl Tracer {
     pub fn trace(&mut self, level: &Level, longest: usize, mut visit: impl FnMut(Outline)) {
         let (values, stride) = (level.values(), level.stride());
         self.passed.clear();
-        self.passed.resize(values.len(), false);
+        self.passed.resize(values.len(), 0);
         // The frame is twine, so a left crack found in all rows at once belongs to a pixel of the picture.
-        let (lefts, _) = values.as_chunks::<STRIP>();
-        let (heres, _) = values.get(1..).unwrap_or(&[]).as_chunks::<STRIP>();
-        let mut look = |first: usize, cracks: &[i16]| {
-            for (pixel, &crack) in (first..).zip(cracks) {
-                if crack < 0 && !self.passed[pixel] {
+        for first in (1..values.len()).step_by(STRIP) {
+            let (left, here, passed) = (&values[first - 1..], &values[first..], &self.passed[first..]);
+            if let (Some(left), Some(here), Some(passed)) =
+                (left.first_chunk::<STRIP>(), here.first_chunk::<STRIP>(), passed.first_chunk::<STRIP>())
+            {
+                // Negative where twine is left of an opening and the crack has not been passed. Most strips hold none: a look at all signs at once.
+                let cracks: [i16; STRIP] = std::array::from_fn(|k| !left[k] & here[k] & !i16::from(passed[k]));
+                if cracks.iter().fold(0, |any, &crack| any | crack) >= 0 {
+                    continue;
+                }
+            }
+            for pixel in first..values.len().min(first + STRIP) {
+                if !values[pixel - 1] & values[pixel] < 0 && self.passed[pixel] == 0 {
                     let position = ((pixel % stride) as i32 - 1, (pixel / stride) as i32 - 1);
                     self.follow(level, pixel, position, longest, &mut visit);
                 }
             }
-        };
-        let mut first = 1;
-        for (left, here) in lefts.iter().zip(heres) {
-            // Negative where twine is left of an opening.
-            let cracks: [i16; STRIP] = std::array::from_fn(|k| !left[k] & here[k]);
-            // Most strips hold none: a look at all signs at once.
-            if cracks.iter().fold(0, |any, &crack| any | crack) < 0 {
-                look(first, &cracks);
-            }
-            first += STRIP;
-        }
-        for (&left, &here) in values.get(first - 1..).unwrap_or(&[]).iter().zip(values.get(first..).unwrap_or(&[])) {
-            look(first, &[!left & here]);
-            first += 1;
         }
     }
 
@@ -75,7 +69,7 @@ impl Tracer {
         loop {
             let left = (heading + 3) & 3;
             if heading == 3 {
-                self.passed[pixel] = true;
+                self.passed[pixel] = -1;
             }
             cut |= outer == FRAME;
             if self.crossings.len() <= longest {
