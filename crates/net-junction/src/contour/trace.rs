@@ -68,9 +68,7 @@ impl Tracer {
         let (mut inner, mut outer) = (values[start], values[at(start, 2)]);
         loop {
             let left = (heading + 3) & 3;
-            if heading == 3 {
-                self.passed[pixel] = -1;
-            }
+            self.passed[pixel] |= -i8::from(heading == 3);
             cut |= outer == FRAME;
             if self.crossings.len() <= longest {
                 // inner < 0 <= outer; the frame's level is no measurement.
