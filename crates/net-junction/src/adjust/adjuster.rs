@@ -111,13 +111,13 @@ impl NetAdjuster {
         // 1. How the camera moved, and outward from the seed what the prediction misses smoothly.
         let mut look = Look {
             twine_m: config.twines_m[config.twines_m.len() / 2],
-            blur_px: [0.0; 2],
+            blur_m: [0.0; 2],
             spread_px: config.point_spread_px,
             coarse_px: coarse_px(cell),
         };
         source.shrink(look.coarse_px);
         let diagonal = (width as f64).hypot(height as f64);
-        look.blur_px = locator.fit_blur(source, graph, profiles, cell, &look, config);
+        look.blur_m = locator.fit_blur(source, graph, profiles, cell, &look, config);
         let warp = grower.grow(source, graph, seed, diagonal, &look, config);
         graph.build(&Warped { map, warp: &warp }, width, height, least);
         if graph.edges.is_empty() {
@@ -172,13 +172,13 @@ impl NetAdjuster {
         solver.solve(graph, &locator.offsets, &locator.weights, ROUNDS[0]);
         solver.commit(graph);
         // 3. What is really there.
-        let width = median_of(&mut self.values, graph.nodes.iter().map(|n| n.scale * look.twine_m));
-        let window = [0, 1].map(|family| look.window_px(width, cell, family));
+        let scale = median_of(&mut self.values, graph.nodes.iter().map(|n| n.scale));
+        let (width, blur) = (scale * look.twine_m, look.blur_m.map(|b| scale * b));
+        let window = blur.map(|b| look.window_px(width, cell, b));
         let half = (window[0].max(window[1]) / FINE_PX).round() as usize;
         // The brighter flank of shaded twine is its extreme.
         // And the top of what motion has blurred is flat.
-        let blur = look.blur_px[0].max(look.blur_px[1]);
-        let beside = ((0.6 * width + 0.5).max(1.0) + 0.5 * blur) / FINE_PX;
+        let beside = ((0.6 * width + 0.5).max(1.0) + 0.5 * blur[0].max(blur[1])) / FINE_PX;
         presence.judge(graph, &locator.profiles, source, image, half, beside.round() as usize, config);
         self.witnesses.judge(graph, &presence.twines, &presence.votes, config);
     }

@@ -15,11 +15,14 @@ const LEAST_NOISE: f32 = 0.15;
 const SEARCH_MIN_PX: f64 = 1.0;
 /// Length over which what the template leaves, as a sum of squares, is taken for noise, px: misfit counts as noise.
 const REST_PX: f32 = 2.5;
-/// Ways of the picture during the exposure that are tried, px; none longer than this part of a cell. Shorter ones leave twine where it is.
-const BLURS_PX: [f64; 6] = [5.0, 6.5, 8.0, 10.0, 12.0, 16.0];
-const BLUR_CELLS: f64 = 0.6;
-/// Share of the variance that motion must explain on top.
-const BLUR_GAIN: f32 = 0.1;
+/// Ways of the picture during the exposure that are tried, px; none longer than this part of a cell, where the first harmonic of the lattice has a
+/// sixth left. Shorter ones than these leave twine where it is.
+const BLURS_PX: [f64; 8] = [5.0, 5.75, 6.5, 7.25, 8.0, 10.0, 12.0, 16.0];
+const BLUR_CELLS: f64 = 0.85;
+/// Share of the variance that motion must explain on top, and the part of what still twine leaves that it may leave at the most: in small cells hardly
+/// anything is left. Chosen on drawn nets, of which none that stood still was taken for moving.
+const BLUR_GAIN: f32 = 0.05;
+const BLUR_LEFT: f32 = 0.7;
 /// Twines on which the diameter is tried.
 const FIT_TWINES: usize = 150;
 
@@ -90,7 +93,8 @@ impl Locator {
                 let Edge { nodes, family, .. } = graph.edges[e];
                 let [a, b] = nodes.map(|n| &graph.nodes[n as usize]);
                 let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
-                let kernel = self.kernels.get(width, look.spread_px, look.blur_px[family], half);
+                let kernel =
+                    self.kernels.get(width, look.spread_px, 0.5 * look.blur_m[family] * (a.scale + b.scale), half);
                 let found = self.kernels.match_at(&kernel, scratch.row(e, 0), half);
                 self.scratch.push(found.gain / found.rest.max(1e-9));
             }
@@ -102,8 +106,8 @@ impl Locator {
         best.1
     }
 
-    /// How far, px, the picture moved across the twines of each family while the shutter was open: the way that explains most of the
-    /// profiles' variance, wherever in reach twine then lies.
+    /// How far, m, the net moved across the twines of each family while the shutter was open: the way that explains most of the
+    /// profiles' variance, wherever in reach twine then lies. Near twine moves farther in the picture than far.
     pub fn fit_blur(
         &mut self,
         source: &Source,
@@ -113,6 +117,7 @@ impl Locator {
         look: &Look,
         config: &AdjustConfig,
     ) -> [f64; 2] {
+        let scale = graph.nodes.iter().map(|n| n.scale).sum::<f64>() / graph.nodes.len().max(1) as f64;
         if BLUR_CELLS * height < BLURS_PX[0] {
             return [0.0; 2];
         }
@@ -126,15 +131,16 @@ impl Locator {
         [0, 1].map(|family| {
             let twines = || (0..graph.edges.len()).step_by(stride).filter(|&e| graph.edges[e].family == family);
             rests.clear();
-            let mut best = (f32::MIN, 0.0);
-            let still = config.twines_m.iter().map(|&twine| (twine, 0.0));
+            let (mut still, mut best) = (f32::MIN, (f32::MIN, 0.0));
+            let standing = config.twines_m.iter().map(|&twine| (twine, 0.0));
             let moving = BLURS_PX.into_iter().take_while(|b| *b <= BLUR_CELLS * cell).map(|b| (look.twine_m, b));
-            for (twine, blur) in still.chain(moving) {
+            for (twine, blur) in standing.chain(moving) {
                 kernels.start(COARSE_PX);
                 explained.clear();
                 for (n, e) in twines().enumerate() {
                     let [a, b] = graph.edges[e].nodes.map(|n| &graph.nodes[n as usize]);
                     let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
+                    let blur = blur / scale * 0.5 * (a.scale + b.scale);
                     let kernel = kernels.get(width, look.spread_px, blur, half);
                     let profile = scratch.row(e, 0);
                     // The same for all kernels, which are of the same length.
@@ -146,10 +152,13 @@ impl Locator {
                     explained.push(shares.fold(0.0, f32::max));
                 }
                 let explained = upper(explained).unwrap_or(0.0);
-                // Only what is well better than no motion.
-                let explained = if blur > 0.0 { explained - BLUR_GAIN } else { explained };
-                if explained > best.0 {
-                    best = (explained, blur);
+                if blur == 0.0 {
+                    still = explained.max(still);
+                } else if explained > best.0
+                    && explained > still + BLUR_GAIN
+                    && 1.0 - explained < BLUR_LEFT * (1.0 - still)
+                {
+                    best = (explained, blur / scale);
                 }
             }
             best.1
@@ -292,8 +301,9 @@ pub(crate) fn kernel_for(kernels: &mut Kernels, graph: &Graph, edge: usize, look
     let Edge { nodes, family, .. } = graph.edges[edge];
     let [a, b] = nodes.map(|n| &graph.nodes[n as usize]);
     let width = (0.5 * look.twine_m * (a.scale + b.scale)).max(0.15);
-    let half = look.window_px(width, a.spacing[family].min(b.spacing[family]), family);
-    kernels.get(width, look.spread_px, look.blur_px[family], (half / kernels.step_px()).round() as usize)
+    let blur = 0.5 * look.blur_m[family] * (a.scale + b.scale);
+    let half = look.window_px(width, a.spacing[family].min(b.spacing[family]), blur);
+    kernels.get(width, look.spread_px, blur, (half / kernels.step_px()).round() as usize)
 }
 
 /// How far a twine is looked for, px.

@@ -12,8 +12,8 @@ const CLASS: f64 = 0.15;
 pub(crate) struct Look {
     /// Diameter, m.
     pub twine_m: f64,
-    /// Way of the picture across twines of each family while the shutter was open, px.
-    pub blur_px: [f64; 2],
+    /// Way of the net across twines of each family while the shutter was open, m.
+    pub blur_m: [f64; 2],
     /// Standard deviation of the point spread, px.
     pub spread_px: f64,
     /// Distance between values across the twine to find it, px.
@@ -23,8 +23,7 @@ pub(crate) struct Look {
 impl Look {
     /// Length of the template on each side, px, for twine of this width in cells of this height: wide enough for twine and blur, not for its
     /// neighbours.
-    pub fn window_px(&self, width: f64, cell: f64, family: usize) -> f64 {
-        let blur = self.blur_px[family];
+    pub fn window_px(&self, width: f64, cell: f64, blur: f64) -> f64 {
         let room = (0.3 * cell + 0.25 * blur).min((0.5 * cell).max(0.3 * cell));
         room.max(2.0).min(0.8 * width + 3.0 * self.spread_px + 1.5 + 0.5 * blur)
     }

@@ -118,8 +118,9 @@ impl Spreader {
         let edge = graph.edge_from(k, family)?;
         let reach = f64::from(reach_px(graph, edge, config.search_cells[0]));
         let width = (look.twine_m * node.scale).max(0.15);
-        let half = (look.window_px(width, node.spacing[family], family) / look.coarse_px).round() as usize;
-        let kernel = self.kernels.get(width, look.spread_px, look.blur_px[family], half);
+        let blur = look.blur_m[family] * node.scale;
+        let half = (look.window_px(width, node.spacing[family], blur) / look.coarse_px).round() as usize;
+        let kernel = self.kernels.get(width, look.spread_px, blur, half);
         let steps = (reach / look.coarse_px).ceil() as usize + 1;
         self.profile.clear();
         self.profile.resize(2 * (steps + kernel.half()) + 1, 0.0);
