@@ -5,6 +5,8 @@
 //! ```
 //! A small camera (424 x 240 px), steps of up to a cell a frame in every direction, speeds that change, turns and tilts; nets flat and bent, jittered, overgrown or bare of growth,
 //! with another net behind and blurred by the motion; murky water, noise, fish.
+//! In `rounds` the camera goes three times round a loop of `FRAMES` pictures (340 take it 50 cells away), and in each round but the first it sees open water for a while,
+//! too long to count through: what it says afterwards it must know from the map.
 //! A slip is a count that is off by more than half a cell against the frame before of the same `track`. A frame is flagged if its count was begun anew, or is in doubt.
 
 use std::error::Error;
@@ -24,7 +26,10 @@ impl Random {
 }
 
 /// Kinds of sequences.
-const KINDS: [&str; 8] = ["strafe", "loop", "approach", "bent", "fish", "murky", "bare", "behind"];
+const KINDS: [&str; 9] = ["strafe", "loop", "approach", "bent", "fish", "murky", "bare", "behind", "rounds"];
+/// How often `rounds` goes round, and pictures of open water in each round but the first.
+const ROUNDS: u32 = 3;
+const WATER_FRAMES: u32 = 12;
 const CELL_M: f64 = 0.05;
 const RATE_HZ: f64 = 10.0;
 
@@ -103,7 +108,7 @@ fn sequence(kind: usize, frames: u32, seed: u64) -> Scenario {
     let length_s = f64::from(frames) / RATE_HZ;
     scenario.path = match KINDS[kind] {
         // The longest step is that on the ellipse's longer side.
-        "loop" => {
+        "loop" | "rounds" => {
             let radius = random.between(0.5, 1.0) * most * length_s / std::f64::consts::TAU;
             Path::Loop { radius_m: [radius, 0.6 * radius], depth_m: 0.08, nod_deg: 5.0, roll_deg: 4.0 }
         }
@@ -134,7 +139,8 @@ struct Tally {
     large_steps: u32,
 }
 
-fn run(scenario: &Scenario, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
+/// The tracker over a sequence, `rounds` times one after the other.
+fn run(scenario: &Scenario, rounds: u32, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
     let (camera, mesh) = (scenario.camera()?, scenario.mesh()?);
     let mut tracker = Tracker::new(camera, mesh, &Config::default())?;
     let mut simulator = Simulator::new(camera);
@@ -142,14 +148,27 @@ fn run(scenario: &Scenario, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
     // Of each count: what its names differ from the true ones by.
     let mut known: Vec<(u32, Vector2<f64>)> = Vec::new();
     let mut last_cells: Option<Vector2<f64>> = None;
-    for k in 0..scenario.frames {
-        let frame = scenario.frame(k)?;
-        let truth = simulator.render(&frame.scene, frame.seed, &mut image)?;
-        let Some(cells) = truth.layers.first().and_then(|l| l.axis).map(|a| a.cells) else { continue };
+    // Not where the round begins: elsewhere in each.
+    let water_from = |round: u32| scenario.frames * (1 + round) / 5;
+    for k in 0..rounds * scenario.frames {
+        let (round, in_round) = (k / scenario.frames, k % scenario.frames);
+        let mut frame = scenario.frame(in_round)?;
+        let timestamp_ns = frame.timestamp_ns + i64::from(round * scenario.frames) * (1e9 / RATE_HZ) as i64;
+        let water = round > 0 && (water_from(round)..water_from(round) + WATER_FRAMES).contains(&in_round);
+        if water {
+            frame.scene.layers.clear();
+        }
+        let truth = simulator.render(&frame.scene, frame.seed ^ (u64::from(round) << 32), &mut image)?;
+        let cells = truth.layers.first().and_then(|l| l.axis).map(|a| a.cells);
+        let Some(cells) = cells else {
+            // Water: nothing to count, but the tracker sees it.
+            tracker.update(image.view().ok_or("no picture")?, timestamp_ns)?;
+            continue;
+        };
         tally.frames += 1;
         tally.large_steps += u32::from(last_cells.is_some_and(|last| (cells - last).amax() > 0.5));
         last_cells = Some(cells);
-        let estimate = tracker.update(image.view().ok_or("no picture")?, frame.timestamp_ns)?;
+        let estimate = tracker.update(image.view().ok_or("no picture")?, timestamp_ns)?;
         let (status, track, connection) = (estimate.status, estimate.track, estimate.connection);
         if status != Status::Ok {
             tally.refused += 1;
@@ -185,12 +204,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut tallies = [Tally::default(); KINDS.len()];
     for seed in first..first + sequences {
         for (kind, name) in KINDS.iter().enumerate() {
-            if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
+            let asked = if wanted.is_empty() { *name != "rounds" } else { wanted.iter().any(|w| w == name) };
+            if !asked {
                 continue;
             }
             let mut scenario = sequence(kind, frames, seed);
             scenario.name = (*name).to_owned();
-            run(&scenario, &mut tallies[kind])?;
+            let rounds = if *name == "rounds" { ROUNDS } else { 1 };
+            run(&scenario, rounds, &mut tallies[kind])?;
         }
     }
     println!("| kind | frames | steps above half a cell | refused | flagged | recognised again | silent slips |");
