@@ -12,7 +12,9 @@ pub(crate) const END: f32 = 0.03;
 const ALONG_PX: f32 = 1.75;
 /// A picture coordinate's unit, 1/65536 px.
 const ONE: f32 = 65536.0;
-/// Most samples of a bin.
+/// Least samples of a bin that is measured, steps then being parts of a pixel, and most of any: bins of small cells are shorter than that distance, and one sample
+/// of each leaves out too many pixels where light is low.
+const SAMPLES_MIN: f32 = 2.0;
 const SAMPLES_MAX: f32 = 16.0;
 /// Profiles are sampled in whole vectors of so many values, and in pieces of at most so many.
 const LANES: usize = 8;
@@ -197,7 +199,8 @@ impl WithSimd for Across<'_> {
         let length = chord.norm();
         let normal = Vector2::new(-chord.y, chord.x) / length;
         let share = (1.0 - 2.0 * END) / inside.len() as f32;
-        let samples = (length * share / ALONG_PX).ceil().clamp(1.0, SAMPLES_MAX) as usize;
+        let least = if step < 1.0 { SAMPLES_MIN } else { 1.0 };
+        let samples = (length * share / ALONG_PX).ceil().clamp(least, SAMPLES_MAX) as usize;
         let step = normal * step;
         let back = step * (width / 2) as f32;
         let weight = 1.0 / samples as f32;
