@@ -55,7 +55,8 @@ impl Workspace {
         let fold = if followed { lock.evidence.fold() } else { self.fold(&surface, place) };
         let evidence = evidence.folded(fold);
         let evidence = Evidence { above: lock.above, ..evidence };
-        let evidence = evidence.bent_by(mean_plane.normal.angle(&surface.normal()));
+        let bend = mean_plane.normal.angle(&surface.normal());
+        let evidence = evidence.bent(bend, surface.sides, surface.depth, config.height_length_m);
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {
             pose: labels.pose(&surface),

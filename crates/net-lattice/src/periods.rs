@@ -10,6 +10,8 @@ use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
 const RIVALS: [f64; 12] = [1.0 / 7.0, 1.0 / 6.0, 0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// Agreeing tiles without which all of the picture tells between rival periods.
 const FEWEST: usize = 4;
+/// Coherence, summed over both families, that a rival period has at least. Slid to where its twines seem to be, one that is not there has up to 3.4.
+const IN_STEP: f64 = 3.5;
 /// How often the period may change.
 const CHANGES: usize = 3;
 /// Blurs, px, of which the drawing that tells between rivals takes the best.
@@ -80,7 +82,8 @@ impl Workspace {
             if r.gain <= second {
                 break;
             }
-            let worth = if r.gain > 0.0 { r.gain * self.all_there(r) } else { r.gain };
+            let Some(there) = self.all_there(r) else { continue };
+            let worth = if r.gain > 0.0 { r.gain * there } else { r.gain };
             if worth > best.0 {
                 second = best.0;
                 best = (worth, k);
@@ -110,10 +113,13 @@ impl Workspace {
         }
     }
 
-    /// A lattice of which only every second or third line is there draws most of the picture, too: 1 if all are, 0 if they are not.
-    fn all_there(&mut self, rival: &Rival) -> f64 {
+    /// A lattice of which only every second or third line is there draws most of the picture, too: 1 if all are, 0 if they are not. `None` if the tiles are
+    /// out of step: the wider a rival's cells, the more its drawing explains of any fish.
+    fn all_there(&mut self, rival: &Rival) -> Option<f64> {
         let place = self.scale_for(rival.surface.depth);
         self.measure_comb(&rival.surface, place, rival.looks, &Window::ALL);
-        1.0 - (2.0 * self.fold(&rival.surface, place).unlike).min(1.0)
+        let [a, b] = self.evidence().v;
+        let in_step = rival.scale == 1.0 || a + b > IN_STEP;
+        in_step.then(|| 1.0 - (2.0 * self.fold(&rival.surface, place).unlike).min(1.0))
     }
 }
