@@ -128,7 +128,7 @@ impl Tally {
         if let Some(e) = found {
             let v = &e.evidence;
             line += &format!(
-                " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3} C {:.2} {:.2} cg {:.2} {:.2} above {:.2}",
+                " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3} C {:.2} {:.2} cg {:.2} {:.2} above {:.2} scatter {:.3} {:.3} bumps {:.2}",
                 e.model,
                 e.polarity,
                 v.bend.to_degrees(),
@@ -155,6 +155,9 @@ impl Tally {
                 v.comb_good,
                 v.comb_near,
                 v.above,
+                v.scatter[0],
+                v.scatter[1],
+                v.bumps.to_degrees(),
             );
         }
         println!("{line}");

@@ -206,10 +206,12 @@ impl Evidence {
         let bend_deg = self.bend.to_degrees();
         let whole = self.comb_good.min(0.8);
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
-        let there = logistic(-5.7 + 0.95 * second + 5.8 * whole - 4.9 * unsettled);
+        let there = logistic(-5.5 + 0.95 * second + 5.8 * whole - 4.9 * unsettled);
         // Of 276 right poses of the studies that the rest vouches for none has more than 0.044 of a cell; lines, cells and noise at random that are in step with a
-        // lattice in more than half of the tiles hardly ever have less than 0.04.
-        let steady = logistic((0.044 - self.scatter[0].hypot(self.scatter[1]) / std::f64::consts::SQRT_2) / 0.002);
+        // lattice in more than half of the tiles hardly ever have less than 0.04. What is scattered by bumps keeps its second harmonic in step.
+        let regular = ((weaker / f64::sqrt(2.0 * self.tiles2.max(1) as f64) - 0.7) / 0.1).clamp(0.0, 1.0);
+        let scatter = self.scatter[0].hypot(self.scatter[1]) / std::f64::consts::SQRT_2;
+        let steady = logistic((0.044 + 0.016 * regular - scatter) / 0.002);
         // A sheet may bend freely where no tile says otherwise. No right pose of bent sheets in the studies has less than 0.44 of the tiles about the axis.
         let borne = if self.bend > 1e-6 { logistic((self.comb_near - 0.4) / 0.015) } else { 1.0 };
         // Knots of real nets take it down to 0.94. Where meshes are too small to show a second harmonic they show no knots either: there no right pose of the
@@ -270,6 +272,7 @@ mod tests {
         let ask = Config::default().probability_threshold;
         let sound = Evidence {
             v2: [16.0; 2],
+            tiles2: 144,
             comb_good: 1.0,
             comb_near: 1.0,
             separable: 1.0,
@@ -279,7 +282,9 @@ mod tests {
         };
         let p = |e: Evidence| e.probability(0.001);
         assert!(p(Evidence { scatter: [0.03; 2], ..sound }) > ask, "knots some per cent of a side off");
-        assert!(p(Evidence { scatter: [0.05; 2], ..sound }) < ask, "lines at random places");
+        assert!(p(Evidence { scatter: [0.05; 2], ..sound }) > ask, "bumps that leave the second harmonic in step");
+        let random = Evidence { scatter: [0.05; 2], v2: [8.0; 2], ..sound };
+        assert!(p(random) < ask, "lines at random places");
         let bend = |degrees: f64, comb_good: f64| Evidence { bend: degrees.to_radians(), comb_good, ..sound };
         assert!(p(bend(4.3, 0.95)) > ask, "a bend that nearly every tile agrees on");
         assert!(p(bend(4.3, 0.75)) < ask, "one that a quarter of them does not");
