@@ -1,7 +1,7 @@
 //! The kinds of simulated pictures.
 
 use net_sim::{
-    Extent, Hole, Kind, Layer, Light, Net, NetPose, Object, Scenario, Scene, Sensor, Snow, Study, Twine, Water,
+    Extent, Growth, Hole, Kind, Layer, Light, Net, NetPose, Object, Scenario, Scene, Sensor, Snow, Study, Twine, Water,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,6 +24,13 @@ pub const KINDS: &[(&str, Make)] = &[
     ("noise", |s| make(s, 0.5, |draw, scene| scene.sensor.read_noise_grey = draw.between(6.0, 12.0))),
     ("snow", |s| make(s, 0.5, |_, scene| scene.snow = Snow { density_per_m3: 900.0, size_m: 0.0018, ..scene.snow })),
     ("fish", |s| make(s, 0.5, fish)),
+    ("overgrown", |s| make(s, 0.5, overgrow)),
+    ("overgrown, torn", |s| {
+        make(s, 0.5, |draw, scene| {
+            overgrow(draw, scene);
+            tear(draw, scene);
+        })
+    }),
     ("hung, bent", |s| make(s, 0.5, bend)),
     ("motion blur of 8 px", |s| make(s, 0.5, motion)),
     (GRID, |_| Scenario::by_name("fig-5.6").unwrap_or_default()),
@@ -123,6 +130,13 @@ fn fish(draw: &mut Draw, scene: &mut Scene) {
             ..Object::default()
         });
     }
+}
+
+/// Tufts on a twentieth to a third of the twines.
+fn overgrow(draw: &mut Draw, scene: &mut Scene) {
+    let net = &mut scene.layers[0].net;
+    net.growth =
+        Growth { density: draw.logarithmic(0.05, 0.35), size_m: draw.between(0.008, 0.02), ..Growth::default() };
 }
 
 /// As nets hang: the sheet, mesh and place of the study of hung nets.
