@@ -196,7 +196,7 @@ impl Evidence {
     /// `tilt_sigma` (rad) true but for a factor, and what bumps may do added.
     ///
     /// The weights are a logistic regression with weights of one sign on 635 scenes of the simulator's studies (`net_sim::Study`), 270 of them without a net, half of
-    /// those patterns much like one, wrong claims counted eightfold; see the examples `study` and `score` for what they lead to.
+    /// those patterns much like one, wrong claims counted eightfold, the constant then raised by a half by hand; see the examples `study` and `score` for what they lead to.
     pub fn probability(&self, tilt_sigma: f64) -> f64 {
         // Nothing but the second harmonic was not fitted: without one nothing is vouched for, and one deviation is what noise has. Motion blur turns its sign in
         // one family; in both it is turned where the pattern is no twine (scales).
