@@ -11,6 +11,9 @@ const FEW: usize = 5;
 /// Cells per px of the picture from which the second harmonic is too near to the pixels' own limit (half a cycle per px).
 const FINEST: f64 = 1.0 / 4.4;
 
+/// A sheet whose tangent on the axis and mean plane differ by less than this, rad, is flat but for rounding.
+const FLAT: f64 = 1e-6;
+
 /// Coherence of the phases left over in the tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Evidence {
@@ -47,7 +50,7 @@ pub struct Evidence {
     pub balance: f64,
     /// Variance of the average cell over that of noise: below about 1 the two above mean nothing.
     pub cell_snr: f64,
-    /// Share of the tiles with strong waves whose phases contradict the lattice.
+    /// Share of the tiles with strong waves whose phases contradict the lattice. Told, but not asked by [`Self::probability`].
     pub dissent: f64,
     /// Share of the tiles in which something else than a net hides what could agree or contradict.
     pub hidden: f64,
@@ -182,7 +185,7 @@ impl Evidence {
     pub(crate) fn bent(mut self, angle: f64, sides: [f64; 2], depth: f64, length: f64) -> Self {
         self.bend = angle;
         let off = f64::max(self.scatter[0] * sides[0], self.scatter[1] * sides[1]);
-        self.bumps = if angle > 1e-6 { off * depth / (length * length) } else { 0.0 };
+        self.bumps = if angle > FLAT { off * depth / (length * length) } else { 0.0 };
         self
     }
 
@@ -213,7 +216,7 @@ impl Evidence {
         let scatter = self.scatter[0].hypot(self.scatter[1]) / std::f64::consts::SQRT_2;
         let steady = logistic((0.044 + 0.016 * regular - scatter) / 0.002);
         // A sheet may bend freely where no tile says otherwise. No right pose of bent sheets in the studies has less than 0.44 of the tiles about the axis.
-        let borne = if self.bend > 1e-6 { logistic((self.comb_near - 0.4) / 0.015) } else { 1.0 };
+        let borne = if self.bend > FLAT { logistic((self.comb_near - 0.4) / 0.015) } else { 1.0 };
         // Knots of real nets take it down to 0.94. Where meshes are too small to show a second harmonic they show no knots either: there no right pose of the
         // studies has less than 0.97, unless noise has a tenth of the cell's power, but scales and cells at random places reach 0.92.
         let snr = self.cell_snr.max(1e-6);

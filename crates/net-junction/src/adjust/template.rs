@@ -21,10 +21,10 @@ pub(crate) struct Look {
 }
 
 impl Look {
-    /// Length of the template on each side, px, for twine of this width in cells of this height: wide enough for twine and blur, not for its
-    /// neighbours.
+    /// Length of the template on each side, px, for twine of this width in cells of this height that the picture's motion smears over `blur`, all px: wide
+    /// enough for twine and blur, not for its neighbours.
     pub fn window_px(&self, width: f64, cell: f64, blur: f64) -> f64 {
-        let room = (0.3 * cell + 0.25 * blur).min((0.5 * cell).max(0.3 * cell));
+        let room = (0.3 * cell + 0.25 * blur).min(0.5 * cell);
         room.max(2.0).min(0.8 * width + 3.0 * self.spread_px + 1.5 + 0.5 * blur)
     }
 }

@@ -94,7 +94,7 @@ impl Namer {
         while let Some(seed) = self.next_seed(knot_of_corner) {
             let basis = match net.and_then(|n| n.basis_at(boxes[seed].centre())) {
                 Some(basis) => basis,
-                None => self.basis_near(seed, boxes, knots),
+                None => Self::basis_of(&boxes[seed]),
             };
             self.walk(seed, basis, boxes, knot_of_corner);
             if self.named.is_empty() || self.join(boxes, knots, net, seed) {
@@ -167,9 +167,9 @@ impl Namer {
         self.named.iter().map(|&k| (distance(k), k)).min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Basis of an opening without a pose: as its nearest named neighbour's would be, else the first side along u.
-    fn basis_near(&self, seed: usize, boxes: &[CellBox], _knots: &[Knot]) -> Basis {
-        let (side1, side2) = sides(&boxes[seed]);
+    /// Basis of an opening without a pose: of its sides the one along u first.
+    fn basis_of(found: &CellBox) -> Basis {
+        let (side1, side2) = sides(found);
         let along_u = if side1.x.abs() * side2.norm() >= side2.x.abs() * side1.norm() { side1 } else { side2 };
         let other = if along_u == side1 { side2 } else { side1 };
         let b1 = if along_u.x < 0.0 { -along_u } else { along_u };
@@ -248,7 +248,7 @@ impl Namer {
             Some(net) => net.lattice_at(to).zip(net.lattice_at(from)).map(|(a, b)| a - b),
             None => {
                 // An opening's sides are a twine short of a cell's.
-                let basis = self.basis_near(seed, boxes, knots);
+                let basis = Self::basis_of(&boxes[seed]);
                 let scale = boxes[seed].spacing / (0.5 * (basis.b1.norm() + basis.b2.norm()));
                 let (b1, b2) = (basis.b1 * scale, basis.b2 * scale);
                 let (d, cross) = (to - from, b1.perp(&b2));
