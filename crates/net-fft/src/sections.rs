@@ -13,8 +13,8 @@ pub struct GridConfig {
     pub rows: usize,
     /// Columns of sections.
     pub columns: usize,
-    /// How much of its length a section shares with the next one: 0 side by side (thesis), below 1. With overlap the sections' sides are rounded down to
-    /// products of 2, 3 and 5, which transform fastest.
+    /// How much of its length a section shares with the next one: 0 side by side (thesis), below 1. Sections' sides are rounded down to numbers that
+    /// transform fast: with overlap products of 2, 3 and 5; side by side of 7 as well, so that next to nothing is left out (of 424 px 4, which took half as long again).
     pub overlap: f64,
 }
 
@@ -47,7 +47,8 @@ impl GridConfig {
         let side = |length: usize, count: usize| {
             let shared = count as f64 - (count as f64 - 1.0) * self.overlap;
             let longest = ((length as f64 / shared).floor() as usize).max(1);
-            if self.overlap == 0.0 { longest } else { fast_size_up_to(longest) }
+            let factors: &[usize] = if self.overlap == 0.0 { &[2, 3, 5, 7] } else { &[2, 3, 5] };
+            fast_size_up_to(longest, factors)
         };
         (side(width, self.columns), side(height, self.rows))
     }
@@ -68,10 +69,10 @@ impl GridConfig {
     }
 }
 
-/// The largest product of 2, 3 and 5 that does not exceed `length`, and is even where it can be.
-fn fast_size_up_to(length: usize) -> usize {
+/// The largest product of `factors` that does not exceed `length`, and is even where it can be.
+fn fast_size_up_to(length: usize, factors: &[usize]) -> usize {
     let is_fast = |mut n: usize| {
-        for factor in [2, 3, 5] {
+        for &factor in factors {
             while n.is_multiple_of(factor) {
                 n /= factor;
             }
@@ -163,11 +164,13 @@ mod tests {
     use net_geometry::Lens;
 
     #[test]
-    fn four_sections_are_the_thesiss() {
+    fn four_sections_are_the_thesiss_but_for_a_strip_in_the_middle() {
         let grid = GridConfig::default();
-        assert_eq!(grid.section_size(848, 480), (424, 240));
-        assert_eq!(grid.corners(848, 480).collect::<Vec<_>>(), [(0, 0), (424, 0), (0, 240), (424, 240)]);
-        assert_eq!(grid.section_size(849, 481), (424, 240));
+        assert_eq!(grid.section_size(848, 480), (420, 240));
+        assert_eq!(grid.corners(848, 480).collect::<Vec<_>>(), [(0, 0), (428, 0), (0, 240), (428, 240)]);
+        assert_eq!(grid.section_size(849, 481), (420, 240));
+        assert_eq!(grid.section_size(1280, 720), (640, 360));
+        assert_eq!(grid.section_size(3, 1), (1, 1));
     }
 
     #[test]
@@ -182,8 +185,8 @@ mod tests {
                 assert_eq!((corners[0], corners[rows * columns - 1]), ((0, 0), (848 - width, 480 - height)));
             }
         }
-        assert_eq!(fast_size_up_to(231), 216);
-        assert_eq!(fast_size_up_to(1), 1);
+        assert_eq!(fast_size_up_to(231, &[2, 3, 5]), 216);
+        assert_eq!(fast_size_up_to(1, &[2]), 1);
     }
 
     #[test]
