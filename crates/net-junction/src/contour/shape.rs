@@ -207,7 +207,7 @@ mod tests {
 
     fn judge(corners: [(f64, f64); 4], basis: Option<Basis>, config: &Config) -> Verdict {
         let crossings = outline_of(corners);
-        let outline = Outline::of(&crossings, false);
+        let outline = Outline::of(&crossings, false, false);
         let area = basis.map_or(400.0, |b| b.cell_area().abs());
         Shaper::default().judge(&outline, Some(ExpectedCell { area, basis }), true, config).verdict
     }

@@ -4,111 +4,227 @@
 //! follower walks the cracks between pixels with the opening on its right and passes every crack once, so the work is
 //! proportional to the length of all borders. Each crack gives one crossing, where the level passes zero between the two pixels.
 
+use crate::contour::block_mean::rounded;
 use crate::contour::level::{FRAME, Level};
 use crate::contour::outline::{Crossing, Outline};
 
 /// Pixels of a row that are looked at together.
-const STRIP: usize = 16;
+const STRIP: usize = 32;
+
+/// Headings of the follower: turning right adds one.
+const EAST: usize = 0;
+const SOUTH: usize = 1;
+const WEST: usize = 2;
+const NORTH: usize = 3;
 
 /// Follows outlines; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Tracer {
-    /// -1 for pixels whose left crack has been passed, else 0.
-    passed: Vec<i8>,
+    /// The widest vectors that the processor has.
+    arch: pulp::Arch,
+    /// Negative for pixels with a left crack that has not been passed.
+    waiting: Vec<i8>,
+    places: Vec<Place>,
+    levels: Vec<Levels>,
     crossings: Vec<Crossing>,
 }
+
+/// Where the follower is: row above column, 16 bits each, so that a step is one sum. Images have at most 32768 pixels a side: the highest bits of column and row are free for the
+/// lower and the higher bit of the heading.
+type Place = u32;
+const COLUMN: Place = 1;
+const ROW: Place = 1 << 16;
+const fn heading_bits(heading: usize) -> Place {
+    (heading as Place & 1) << 15 | (heading as Place >> 1) << 31
+}
+
+/// Levels of a crack's two pixels, 16 bits each: of the twine above that of the opening, which is negative.
+type Levels = u32;
 
 impl Tracer {
     /// Hands every opening's outer outline of at most `longest` crossings to `visit`, in the order of their top-left pixels.
     /// Outlines of twine inside an opening are left out.
     pub fn trace(&mut self, level: &Level, longest: usize, mut visit: impl FnMut(Outline)) {
         let (values, stride) = (level.values(), level.stride());
-        self.passed.clear();
-        self.passed.resize(values.len(), 0);
+        self.waiting.resize(values.len(), 0);
+        self.arch.dispatch(LeftCracks { values, left_cracks: &mut self.waiting });
+        let longest = longest.min(4 * values.len());
+        self.places.resize(longest, 0);
+        self.levels.resize(longest, 0);
         // The frame is twine, so a left crack found in all rows at once belongs to a pixel of the picture.
-        for first in (1..values.len()).step_by(STRIP) {
-            let (left, here, passed) = (&values[first - 1..], &values[first..], &self.passed[first..]);
-            if let (Some(left), Some(here), Some(passed)) =
-                (left.first_chunk::<STRIP>(), here.first_chunk::<STRIP>(), passed.first_chunk::<STRIP>())
-            {
-                // Negative where twine is left of an opening and the crack has not been passed. Most strips hold none: a look at all signs at once.
-                let cracks: [i16; STRIP] = std::array::from_fn(|k| !left[k] & here[k] & !i16::from(passed[k]));
-                if cracks.iter().fold(0, |any, &crack| any | crack) >= 0 {
-                    continue;
-                }
+        for first in (0..values.len()).step_by(STRIP) {
+            // Most strips hold none: a look at all signs at once.
+            let strip = self.waiting[first..].first_chunk::<STRIP>();
+            if strip.is_some_and(|strip| strip.iter().fold(0, |any, &waiting| any | waiting) >= 0) {
+                continue;
             }
             for pixel in first..values.len().min(first + STRIP) {
-                if !values[pixel - 1] & values[pixel] < 0 && self.passed[pixel] == 0 {
-                    let position = ((pixel % stride) as i32 - 1, (pixel / stride) as i32 - 1);
-                    self.follow(level, pixel, position, longest, &mut visit);
+                if self.waiting[pixel] < 0 {
+                    let place = ROW * (pixel / stride - 1) as Place + COLUMN * (pixel % stride - 1) as Place;
+                    let mut walk = Walk {
+                        values,
+                        stride,
+                        start: pixel,
+                        waiting: &mut self.waiting,
+                        places: &mut self.places,
+                        levels: &mut self.levels,
+                        count: 0,
+                        turns: 0,
+                    };
+                    walk.round(place);
+                    // Four turns to the right lead once round an opening, four to the left round twine inside one.
+                    let (count, turns) = (walk.count, walk.turns);
+                    if turns > 0 && count <= longest {
+                        self.crossings.resize(count, Crossing { x: 0, y: 0 });
+                        visit(self.arch.dispatch(Cracks {
+                            places: &self.places[..count],
+                            levels: &self.levels[..count],
+                            crossings: &mut self.crossings,
+                        }));
+                    }
                 }
             }
         }
     }
+}
 
-    /// Walks the border that begins at the left crack of pixel `start`, `(u, v)` in the picture.
-    fn follow(
+/// Once along a border, from the left crack of a pixel back to it.
+struct Walk<'a> {
+    values: &'a [i16],
+    stride: usize,
+    /// The pixel.
+    start: usize,
+    waiting: &'a mut [i8],
+    /// Of the first cracks that were passed, as many as there is room for: the opening's pixel with the heading, and the levels.
+    places: &'a mut [Place],
+    levels: &'a mut [Levels],
+    /// How many were passed.
+    count: usize,
+    /// To the right, less those to the left.
+    turns: i32,
+}
+
+impl Walk<'_> {
+    /// Walks from `place`, the start's in the picture.
+    fn round(&mut self, place: Place) {
+        let mut here = Some((self.start, place, NORTH));
+        while let Some((pixel, place, heading)) = here {
+            here = match heading {
+                EAST => self.straight_on::<EAST>(pixel, place),
+                SOUTH => self.straight_on::<SOUTH>(pixel, place),
+                WEST => self.straight_on::<WEST>(pixel, place),
+                _ => self.straight_on::<NORTH>(pixel, place),
+            };
+        }
+    }
+
+    /// Passes cracks up to the next turn; tells where it leads, `None` where the border is closed.
+    #[inline(always)]
+    fn straight_on<const HEADING: usize>(
         &mut self,
-        level: &Level,
-        start: usize,
-        (mut u, mut v): (i32, i32),
-        longest: usize,
-        visit: &mut impl FnMut(Outline),
-    ) {
-        let (values, stride) = (level.values(), level.stride());
-        // East, south, west, north: turning right adds one.
-        let (along_u, along_v) = ([1, 0, -1, 0], [0, 1, 0, -1]);
-        let steps = [1_isize, stride as isize, -1, -(stride as isize)];
+        mut pixel: usize,
+        mut place: Place,
+    ) -> Option<(usize, Place, usize)> {
+        let left = (HEADING + 3) % 4;
         // The frame is one pixel wide, so a step from a pixel of the picture, or one more to the side, stays inside `values`.
-        let at = |pixel: usize, direction: usize| pixel.wrapping_add_signed(steps[direction]);
-        self.crossings.clear();
-        let (mut cut, mut turns) = (false, 0);
-        let (mut pixel, mut heading) = (start, 3);
-        // Levels on both sides of the crack.
-        let (mut inner, mut outer) = (values[start], values[at(start, 2)]);
-        loop {
-            let left = (heading + 3) & 3;
-            self.passed[pixel] |= -i8::from(heading == 3);
-            cut |= outer == FRAME;
-            if self.crossings.len() <= longest {
-                // inner < 0 <= outer; the frame's level is no measurement.
-                let (inner, outer) = (i32::from(inner), i32::from(outer));
-                let part = if outer == i32::from(FRAME) {
-                    Crossing::PARTS / 2
-                } else {
-                    inner * Crossing::PARTS / (inner - outer)
-                };
-                let (x, y) = (u * Crossing::PARTS + along_u[left] * part, v * Crossing::PARTS + along_v[left] * part);
-                self.crossings.push(Crossing { x, y });
+        let steps = [1, self.stride, 1_usize.wrapping_neg(), self.stride.wrapping_neg()];
+        let moves = [COLUMN, ROW, COLUMN.wrapping_neg(), ROW.wrapping_neg()];
+        let (mut inner, mut outer) = (self.values[pixel], self.values[pixel.wrapping_add(steps[left])]);
+        let next = loop {
+            if let (Some(to), Some(levels)) = (self.places.get_mut(self.count), self.levels.get_mut(self.count)) {
+                *to = place | heading_bits(HEADING);
+                *levels = Levels::from(outer as u16) << 16 | Levels::from(inner as u16);
             }
-            let ahead = at(pixel, heading);
-            let in_front = values[ahead];
-            if in_front >= 0 {
-                outer = in_front;
-                heading = (heading + 1) & 3;
-                turns += 1;
-            } else {
-                let aside = at(ahead, left);
-                let beside = values[aside];
-                (u, v) = (u + along_u[heading], v + along_v[heading]);
-                if beside >= 0 {
-                    (pixel, inner, outer) = (ahead, in_front, beside);
-                } else {
-                    // Round the corner of the same pixel of twine.
-                    (pixel, inner) = (aside, beside);
-                    (u, v) = (u + along_u[left], v + along_v[left]);
-                    heading = left;
-                    turns -= 1;
-                }
+            self.count += 1;
+            if HEADING == NORTH {
+                self.waiting[pixel] = 0;
             }
-            if pixel == start && heading == 3 {
-                break;
+            let ahead = pixel.wrapping_add(steps[HEADING]);
+            inner = self.values[ahead];
+            if inner >= 0 {
+                self.turns += 1;
+                break (pixel, place, (HEADING + 1) % 4);
             }
+            let aside = ahead.wrapping_add(steps[left]);
+            outer = self.values[aside];
+            place = place.wrapping_add(moves[HEADING]);
+            if outer < 0 {
+                // Round the corner of the same pixel of twine.
+                self.turns -= 1;
+                break (aside, place.wrapping_add(moves[left]), left);
+            }
+            pixel = ahead;
+            if HEADING == NORTH && pixel == self.start {
+                return None;
+            }
+        };
+        Some(next).filter(|&(pixel, _, heading)| pixel != self.start || heading != NORTH)
+    }
+}
+
+/// Where twine is left of an opening, as a task for wide vectors.
+struct LeftCracks<'a> {
+    values: &'a [i16],
+    /// As many; negative there.
+    left_cracks: &'a mut [i8],
+}
+
+impl pulp::WithSimd for LeftCracks<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let ([_, values @ ..], [_, left_cracks @ ..]) = (self.values, self.left_cracks) else { return };
+        for (to, (&left, &here)) in left_cracks.iter_mut().zip(self.values.iter().zip(values)) {
+            *to = ((!left & here) >> 15) as i8;
         }
-        // Four turns to the right lead once round an opening, four to the left round twine inside one.
-        if turns > 0 && self.crossings.len() <= longest {
-            visit(Outline::of(&self.crossings, cut));
+    }
+}
+
+/// The cracks around an opening, as a task for wide vectors: to its outline.
+struct Cracks<'a> {
+    places: &'a [Place],
+    levels: &'a [Levels],
+    /// As many.
+    crossings: &'a mut [Crossing],
+}
+
+impl<'a> pulp::WithSimd for Cracks<'a> {
+    type Output = Outline<'a>;
+
+    /// The level passes from negative to not negative: between whole numbers at -1/2, so that no crossing falls on a pixel and no outline touches itself.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Outline<'a> {
+        let column = |place: Place| (place & 0x7FFF) as i32;
+        let row = |place: Place| (place >> 16 & 0x7FFF) as i32;
+        // The heading's lower and higher bit.
+        let bits = |place: Place| ((place >> 15 & 1) as i32, (place >> 31) as i32);
+        let outer = |levels: Levels| levels as i32 >> 16;
+        for (to, (&place, &levels)) in self.crossings.iter_mut().zip(self.places.iter().zip(self.levels)) {
+            let (odd, second) = bits(place);
+            // inner < 0 <= outer; the frame's level is no measurement.
+            let (inner, outer) = ((levels << 16) as i32 >> 16, outer(levels));
+            let part = (inner as f32 + 0.5) * Crossing::PARTS as f32 / (inner - outer) as f32;
+            let part = if outer == i32::from(FRAME) { Crossing::PARTS / 2 } else { i32::from(rounded(part)) };
+            // Left of east is north, of south east, of west south, of north west.
+            let part = if odd == second { -part } else { part };
+            to.x = column(place) * Crossing::PARTS + (part & -odd);
+            to.y = row(place) * Crossing::PARTS + (part & (odd - 1));
         }
+        let cut = self.levels.iter().fold(0, |most, &levels| outer(levels).max(most)) == i32::from(FRAME);
+        let (mut lefts, mut tops) = (0, 0);
+        let (mut first_column, mut last_column, mut first_row, mut last_row) = (i32::MAX, 0, i32::MAX, 0);
+        for &place in self.places {
+            let (odd, second) = bits(place);
+            lefts += odd & second;
+            tops += 1 - (odd | second);
+            first_column = first_column.min(column(place));
+            last_column = last_column.max(column(place));
+            first_row = first_row.min(row(place));
+            last_row = last_row.max(row(place));
+        }
+        let gapless = (tops, lefts) == (last_column - first_column + 1, last_row - first_row + 1);
+        Outline::of(self.crossings, cut, gapless)
     }
 }
 
