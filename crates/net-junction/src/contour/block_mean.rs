@@ -5,6 +5,18 @@ use net_image::Image;
 /// Side of the squares over which the block's size is constant, px.
 pub(crate) const TILE: usize = 16;
 
+/// Largest pixel.
+const VALUE_MAX: usize = 4080;
+
+/// By how many bits `number` has to be shifted down not to exceed `most`.
+const fn bits_over(number: usize, most: usize) -> u32 {
+    let mut bits = 0;
+    while number >> bits > most {
+        bits += 1;
+    }
+    bits
+}
+
 /// Buffers of this stage.
 #[derive(Debug, Default)]
 pub(crate) struct BlockMean {
@@ -38,8 +50,12 @@ impl BlockMean {
     #[inline(always)]
     fn small_blocks<const SIDE: usize>(&mut self, source: &Image<u16>, out: &mut Image<u16>) {
         let (width, height, half) = (source.width(), source.height(), SIDE / 2);
+        // Sixteen bits a value, all through: so many of the columns' lowest, rounded, are left out that a block's sum fits too.
+        let shift = const { bits_over(SIDE * SIDE * VALUE_MAX, u16::MAX as usize - SIDE * SIDE) };
         self.columns.clear();
         self.columns.resize(width + 2 * half, 0);
+        let rounding = (1 << shift) / 2;
+        self.columns[half..][..width].fill(rounding);
         for v in 0..height + half {
             let sums = &mut self.columns[half..][..width];
             let entering = (v < height).then(|| source.row(v));
@@ -56,16 +72,19 @@ impl BlockMean {
             let Some(middle) = v.checked_sub(half) else { continue };
             let rows = (v + 1).min(height) - middle.saturating_sub(half);
             let to = out.row_mut(middle);
-            let scale = 1.0 / (rows * SIDE) as f32;
+            // 65536ths of a block's sum.
+            let pixels = rows * SIDE;
+            let per_pixel = u32::from((((65536 << shift) + pixels / 2) / pixels) as u16);
             for (to, block) in to.iter_mut().zip(self.columns.array_windows::<SIDE>()) {
-                // As signed: that converts at once, and no sum has 31 bits.
-                *to = rounded(block.iter().map(|&sum| i32::from(sum)).sum::<i32>() as f32 * scale);
+                let sum = block.iter().fold((pixels / 2) as u16 >> shift, |all, &sum| all + (sum >> shift));
+                *to = ((u32::from(sum) * per_pixel) >> 16) as u16;
             }
             // At both ends blocks have fewer columns.
             for u in (0..half.min(width)).chain(width.saturating_sub(half).max(half)..width) {
-                let columns = (u + half + 1).min(width) - u.saturating_sub(half);
+                let columns = ((u + half + 1).min(width) - u.saturating_sub(half)) as u32;
                 let sum: u32 = self.columns[u..u + SIDE].iter().map(|&sum| u32::from(sum)).sum();
-                to[u] = rounded(sum as f32 * (1.0 / (rows * columns) as f32));
+                let pixels = rows as u32 * columns;
+                to[u] = ((sum - columns * u32::from(rounding) + pixels / 2) / pixels) as u16;
             }
         }
     }
@@ -150,7 +169,10 @@ mod tests {
                 mean.take(&source, &half_blocks, &mut by_rows);
                 sums.sum_up(&source);
                 sums.means_by_sums(&half_blocks, &mut by_sums);
-                assert_eq!(by_rows.data(), by_sums.data(), "{width}x{height}, {half}");
+                for (a, b) in by_rows.data().iter().zip(by_sums.data()) {
+                    // Each is rounded from what may be a hair to one side of a half.
+                    assert!(a.abs_diff(*b) <= 1, "{width}x{height}, {half}: {a} {b}");
+                }
             }
         }
     }

@@ -76,6 +76,17 @@ impl Threshold {
         let (width, height) = (self.deviation.width(), self.deviation.height());
         self.level.resize(width, height);
         let (wide, high) = (self.tiles_wide, self.tiles_high);
+        let sign = if light { 1 } else { -1 };
+        if let [first, rest @ ..] = &self.offsets[..]
+            && rest.iter().all(|offset| offset == first)
+        {
+            let offset = rounded(*first) as i16;
+            for v in 0..height {
+                let pixels = self.level.row_mut(v).iter_mut().zip(self.deviation.row(v));
+                pixels.for_each(|(level, &deviation)| *level = sign * deviation - offset);
+            }
+            return;
+        }
         for v in 0..height {
             let (row0, row1, b) = between_tiles(v, high);
             let (above, below) = (&self.offsets[row0 * wide..][..wide], &self.offsets[row1 * wide..][..wide]);
@@ -88,13 +99,6 @@ impl Threshold {
                 let (col0, col1, a) = between_tiles(u, wide);
                 let end = (((u + TILE / 2) / TILE) * TILE + TILE / 2).min(width);
                 let (offset, step) = (at(col0) + a * (at(col1) - at(col0)), (at(col1) - at(col0)) / TILE as f32);
-                let sign = if light { 1 } else { -1 };
-                if step == 0.0 {
-                    let offset = rounded(offset) as i16;
-                    target[u..end].iter_mut().zip(&source[u..end]).for_each(|(t, &d)| *t = sign * d - offset);
-                    u = end;
-                    continue;
-                }
                 for (k, (t, &d)) in target[u..end].iter_mut().zip(&source[u..end]).enumerate() {
                     *t = sign * d - rounded(offset + step * k as f32) as i16;
                 }
@@ -151,21 +155,24 @@ impl Threshold {
         self.blurred.resize(width, height);
         self.scratch.resize(width, height);
         let passes = (2.0 * sigma * sigma).round().clamp(0.0, 24.0) as usize;
-        for (v, row) in image.rows().enumerate() {
-            for (b, &p) in self.blurred.row_mut(v).iter_mut().zip(row) {
-                *b = u16::from(p) * SCALE as u16;
+        if passes == 0 {
+            for (v, row) in image.rows().enumerate() {
+                for (b, &p) in self.blurred.row_mut(v).iter_mut().zip(row) {
+                    *b = u16::from(p) * SCALE as u16;
+                }
             }
         }
-        for _ in 0..passes {
+        for pass in 0..passes {
             for v in 0..height {
-                let (source, target) = (self.blurred.row(v), self.scratch.row_mut(v));
-                for (t, w) in target[1.min(width)..].iter_mut().zip(source.windows(3)) {
-                    *t = (w[0] + 2 * w[1] + w[2] + 2) >> 2;
+                let target = self.scratch.row_mut(v);
+                // Of the picture itself the kernel's sums are whole: no row of it is copied first.
+                if pass == 0 {
+                    blur_row(image.row(v), target, |a, b, c| {
+                        (u16::from(a) + 2 * u16::from(b) + u16::from(c)) * (SCALE as u16 / 4)
+                    });
+                } else {
+                    blur_row(self.blurred.row(v), target, |a, b, c| (a + 2 * b + c + 2) >> 2);
                 }
-                // Beyond the ends the last pixel goes on.
-                let last = width - 1;
-                target[0] = (3 * source[0] + source[1.min(last)] + 2) >> 2;
-                target[last] = (3 * source[last] + source[last.saturating_sub(1)] + 2) >> 2;
             }
             for v in 0..height {
                 let (above, below) = (self.scratch.row(v.saturating_sub(1)), self.scratch.row((v + 1).min(height - 1)));
@@ -184,7 +191,8 @@ impl Threshold {
         let (wide, high) = (self.tiles_wide, self.tiles_high);
         self.spread.clear();
         self.spread.resize(wide * high, 0.0);
-        for v in 0..height {
+        let rows = if config.offset_deviations > 0.0 { height } else { 0 };
+        for v in 0..rows {
             for (tile, part) in self.deviation.row(v).chunks(TILE).enumerate() {
                 let sum: u32 = part.iter().map(|&d| u32::from(d.unsigned_abs())).sum();
                 self.spread[(v / TILE) * wide + tile] += sum as f32;
@@ -234,6 +242,21 @@ impl pulp::WithSimd for DrawLevel<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         self.threshold.draw_level(self.light);
+    }
+}
+
+/// Each value of `target` from three neighbours of `source`; beyond the ends the last one goes on.
+#[inline(always)]
+fn blur_row<T: Copy>(source: &[T], target: &mut [u16], kernel: impl Fn(T, T, T) -> u16) {
+    let ([first, .., last], [to_first, to_inner @ .., to_last]) = (source, &mut *target) else {
+        // One pixel wide.
+        target.iter_mut().zip(source).for_each(|(to, &here)| *to = kernel(here, here, here));
+        return;
+    };
+    *to_first = kernel(*first, *first, source[1]);
+    *to_last = kernel(source[source.len() - 2], *last, *last);
+    for (to, &[a, b, c]) in to_inner.iter_mut().zip(source.array_windows()) {
+        *to = kernel(a, b, c);
     }
 }
 
