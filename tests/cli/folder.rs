@@ -55,6 +55,34 @@ fn a_full_disk_ends_the_run_with_the_frames_done_so_far() {
     assert_eq!(frames, (0..all as usize).collect::<Vec<_>>());
 }
 
+/// As [`a_full_disk_ends_the_run_with_the_frames_done_so_far`], with a net: the disk is full while its junctions are written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_a_table_of_junctions_that_can_be_read() {
+    let scratch = Scratch::new();
+    let log = scratch.path("log");
+    assert_status(&netpose().arg("sim").arg(&log).args(["--scenario", "strafe", "--frames", "3"]).output().unwrap(), 0);
+    // Room for three rows of poses.csv and for run.json; three frames' junctions take more than 100 kB.
+    let script = "trap '' XFSZ; ulimit -f 48; exec \"$0\" \"$@\"";
+    let mut limited = std::process::Command::new("sh");
+    limited.args(["-c", script, env!("CARGO_BIN_EXE_netpose"), "run"]).arg(&log);
+    let output = limited.args(["--cell", "50mm", "--out"]).arg(scratch.path("out")).output().unwrap();
+    assert_status(&output, 1);
+    assert_says(&output, &["cannot write", "junctions.parquet"]);
+    let table = scratch.path("out/junctions.parquet");
+    let frames_in_it = || -> Vec<(u64, usize)> {
+        let frames = net_log::read_junctions(&table).expect("a table that is whole");
+        frames.map(|frame| frame.expect("a frame")).map(|(number, junctions)| (number, junctions.len())).collect()
+    };
+    assert_eq!(frames_in_it(), []);
+    // Once there is room again, nothing is missing.
+    let mut rest = netpose();
+    rest.arg("run").arg(&log).args(["--cell", "50mm", "--resume", "--out"]).arg(scratch.path("out"));
+    assert_status(&rest.output().unwrap(), 0);
+    let found = frames_in_it();
+    assert!(found.len() == 3 && found.iter().all(|&(_, junctions)| junctions > 100), "{found:?}");
+}
+
 #[test]
 fn resuming_goes_on_behind_the_last_whole_row() {
     let scratch = Scratch::new();

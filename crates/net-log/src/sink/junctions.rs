@@ -120,13 +120,27 @@ impl Pieces {
     fn commit(&mut self, footer: Vec<u8>) -> std::io::Result<()> {
         let old = [&self.groups_end.to_le_bytes()[..], &self.footer].concat();
         std::fs::write(&self.journal, old)?;
-        let groups_end = self.groups_end + self.piece.len() as u64;
+        let groups = self.piece.len();
         self.piece.extend_from_slice(&footer);
-        self.file.seek(SeekFrom::Start(self.groups_end))?;
-        self.file.write_all(&self.piece)?;
+        let written = self.put(&self.piece);
+        if written.is_err() {
+            // The file as it was: what a full disk held before, it holds again.
+            self.piece.truncate(groups);
+            self.put(&self.footer)?;
+            return written;
+        }
+        self.groups_end += groups as u64;
+        self.footer = footer;
         self.piece.clear();
-        (self.groups_end, self.footer) = (groups_end, footer);
         Ok(())
+    }
+
+    /// Replaces what is behind the groups.
+    fn put(&self, tail: &[u8]) -> std::io::Result<()> {
+        let mut file = &self.file;
+        file.set_len(self.groups_end)?;
+        file.seek(SeekFrom::Start(self.groups_end))?;
+        file.write_all(tail)
     }
 }
 
