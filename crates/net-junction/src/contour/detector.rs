@@ -158,6 +158,7 @@ impl JunctionDetector {
         let Self { config, threshold, tracer, shaper, accepted, rejected, outlines, .. } = self;
         // No mesh has an outline longer than this; the web of twine and open water do.
         let longest = 4 * (self.width + self.height);
+        shaper.reserve(longest);
         tracer.trace(threshold.level(light), longest, |outline| {
             let mut found = shaper.judge(&outline, cell_at(outline.middle), light, config);
             let good = found.verdict == Verdict::Accepted;

@@ -76,6 +76,19 @@ pub(crate) struct Huller {
 }
 
 impl Huller {
+    /// Makes room for outlines of up to `longest` crossings, so that none of them needs memory.
+    pub fn reserve(&mut self, longest: usize) {
+        let Self { turns: [once, twice], chain, hull } = self;
+        for crossings in [once, twice] {
+            crossings.clear();
+            crossings.reserve(longest);
+        }
+        chain.clear();
+        chain.reserve(2 * longest + 2);
+        hull.clear();
+        hull.reserve(longest);
+    }
+
     /// The corners of the outline's convex hull, px, in the sense from u to v, those on its edges left out. The outline does not cross itself, so that one
     /// look at each crossing is enough (Melkman 1987). Empty if all lie on a line.
     pub fn hull(&mut self, outline: &Outline) -> &[Vector2<f64>] {

@@ -75,6 +75,13 @@ pub(crate) struct Shaper {
 }
 
 impl Shaper {
+    /// Makes room for outlines of up to `longest` crossings.
+    pub fn reserve(&mut self, longest: usize) {
+        self.huller.reserve(longest);
+        self.points.clear();
+        self.points.reserve(longest);
+    }
+
     /// Lays the shape around an outline and judges it. `cell` is what is expected at the outline's middle.
     pub fn judge(&mut self, outline: &Outline, cell: Option<ExpectedCell>, light: bool, config: &Config) -> CellBox {
         let mut found = CellBox {

@@ -51,6 +51,8 @@ impl Tracer {
         let longest = longest.min(4 * values.len());
         self.places.resize(longest, 0);
         self.levels.resize(longest, 0);
+        self.crossings.clear();
+        self.crossings.reserve(longest);
         // The frame is twine, so a left crack found in all rows at once belongs to a pixel of the picture.
         for first in (0..values.len()).step_by(STRIP) {
             // Most strips hold none: a look at all signs at once.
