@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::estimate::{Connection, NetPose};
 use crate::method::{Found, Track};
 
-/// Probability from which a pose is vouched for. On random scenes of the simulator (`net-fft`, `examples/study.rs`) 0.7 refuses 3 right poses in 188 more than 0.5 would, and
+/// Probability from which a pose is vouched for. On random scenes of the simulator (`net-fft`, `examples/spectrum_study.rs`) 0.7 refuses 3 right poses in 188 more than 0.5 would, and
 /// lets none through that is not one of the nets in view.
 pub(crate) const PROBABILITY_THRESHOLD: f64 = 0.7;
 /// A followed junction is the nearest one within this part of a cell of where the motion puts it.

@@ -30,7 +30,7 @@ pub(crate) fn sections_seeing(field: &LatticeField, sections: &[Section]) -> f64
     if able > 0.0 { seeing / able } else { 0.0 }
 }
 
-/// Probability that what has such support is a net with the right pose: logistic, its weights fitted to the simulator's random scenes and rounded (`examples/study.rs`).
+/// Probability that what has such support is a net with the right pose: logistic, its weights fitted to the simulator's random scenes and rounded (`examples/spectrum_study.rs`).
 pub(crate) fn probability(support: &Support) -> f64 {
     let mean = |family: usize| support.evidence.families[family] / f64::from(support.evidence.terms[family].max(1));
     let [light, dark] =

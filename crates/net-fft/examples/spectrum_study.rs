@@ -1,4 +1,4 @@
-//! Random scenes of the simulator, one line each: what the probability is made of, and whether the answer was right. `cargo run --release -p net-fft --example study -- COUNT [SEED]`.
+//! Random scenes of the simulator, one line each: what the probability is made of, and whether the answer was right. `cargo run --release -p net-fft --example spectrum_study -- COUNT [SEED]`.
 //!
 //! The weights of the probability were fitted to these lines (logistic regression); its figures and those of the sigmas in the method's description come from other seeds.
 

@@ -1,7 +1,7 @@
 //! Errors on random scenes from the simulator, whether the covariance knows them, and what is claimed where there is no net.
 //!
-//!     cargo run --release -p net-lattice --example study -- STUDY [SCENES] [SEED]
-//!     cargo run --release -p net-lattice --example study -- named [FRAMES] [NAME]
+//!     cargo run --release -p net-lattice --example lattice_study -- STUDY [SCENES] [SEED]
+//!     cargo run --release -p net-lattice --example lattice_study -- named [FRAMES] [NAME]
 //!
 //! STUDY: `planar`, `hung`, `negative`, `noise`, `jitter2`, `jitter5`, `sag` (see [`net_sim::Study`]). `named`: the simulator's own
 //! scenarios (those with NAME in their name), at most FRAMES of each.

@@ -1,6 +1,6 @@
 //! What net adjustment reaches, by kind of picture: places, names, missing twines, holes, time.
 //!
-//! `cargo run --release -p net-junction --example study -- [--scenes N] [--seed S] [--only KIND] [--true-pose] [--overlays DIR] [--renders DIR]`
+//! `cargo run --release -p net-junction --example junction_study -- [--scenes N] [--seed S] [--only KIND] [--true-pose] [--overlays DIR] [--renders DIR]`
 //!
 //! Scenes are `net-sim`'s, `N` of each kind (default 8); another seed draws others. Each is adjusted twice: from its true pose (of a bent net a polynomial of fourth degree through its
 //! knots) and from what the lattice estimator makes of the picture (left out with `--true-pose`). With `--renders` the pictures of a folder instead, a `.json` with the
