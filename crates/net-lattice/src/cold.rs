@@ -69,9 +69,7 @@ impl Workspace {
             let Some(surface) = self.lock(&seeded, &COLD, seed) else { continue };
             self.measure_comb(&surface, self.scale_for(surface.depth), seed.looks, &Window::ALL);
             let evidence = self.evidence();
-            let level = self.view.level_for(self.short_px(surface.depth), 12.0);
-            let cell = self.cell_px(surface.depth);
-            let (gain, polarity, blur) = self.gain(&surface, level, cell, &Polarity::BOTH, &[1.2]);
+            let (gain, polarity, blur) = self.drawn(&surface);
             locks.push(Lock {
                 score: c.score,
                 above: c.above,
@@ -90,9 +88,13 @@ impl Workspace {
             }
         }
         let lock = Self::best_lock(&locks);
+        let other = lock.and_then(|lock| Self::another_net(&locks, &lock));
         self.locks = locks;
         let lock = self.elsewhere(lock?);
-        let (mut lock, margin) = self.true_period(lock)?;
+        let (mut lock, mut margin) = self.true_period(lock)?;
+        if let Some(nearer) = other.and_then(|other| self.nearer_net(&lock, other)) {
+            (lock, margin) = nearer;
+        }
         self.focus(&mut lock);
         self.seat(&mut lock);
         self.stages = Some(Stages::new(&lock.start, &lock.surface));
@@ -130,16 +132,37 @@ impl Workspace {
     /// for nothing, so in doubt it is how high a candidate stood in the search, how far above its background, and how well the tiles agree.
     fn best_lock(locks: &[Lock]) -> Option<Lock> {
         let v = |l: &Lock| l.evidence.v[0].min(l.evidence.v[1]);
-        let sure = || locks.iter().filter(|l| v(l) > SURE);
-        if let Some(top) = sure().max_by(|a, b| a.gain.total_cmp(&b.gain)) {
-            // Of two nets the nearer one is what a vehicle drifts into.
-            let another = |l: &&Lock| !same_but_for_period(&l.surface, &top.surface) && l.gain > PART * top.gain;
-            let nearest = sure().filter(another).min_by(|a, b| a.surface.depth.total_cmp(&b.surface.depth));
-            return Some(*nearest.filter(|l| l.surface.depth < top.surface.depth).unwrap_or(top));
+        if let Some(top) = locks.iter().filter(|l| v(l) > SURE).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            return Some(*top);
         }
         let coherence = |l: &Lock| v(l) + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());
         let merit = |l: &Lock| 0.3 * l.score + 0.5 * l.above + coherence(l);
         locks.iter().max_by(|a, b| merit(a).total_cmp(&merit(b))).copied()
+    }
+
+    /// The best lock on another net than the best lock is on, if both are there beyond doubt. Of its lines every second may have been locked to: then it has
+    /// half of the gain that it will have.
+    fn another_net(locks: &[Lock], best: &Lock) -> Option<Lock> {
+        let sure = |l: &Lock| l.evidence.v[0].min(l.evidence.v[1]) > SURE;
+        let another =
+            |l: &&Lock| sure(l) && !same_but_for_period(&l.surface, &best.surface) && l.gain > 0.5 * PART * best.gain;
+        locks.iter().filter(another).filter(|_| sure(best)).max_by(|a, b| a.gain.total_cmp(&b.gain)).copied()
+    }
+
+    /// Of two nets the nearer one is what a vehicle drifts into; which one that is tell their true periods. `other` with its period if it is nearer than `best`
+    /// and no mere ghost beside it, and by how much the next period falls short.
+    fn nearer_net(&mut self, best: &Lock, other: Lock) -> Option<(Lock, f64)> {
+        let other = self.elsewhere(other);
+        let (other, margin) = self.true_period(other)?;
+        let nearer = other.surface.depth < best.surface.depth && !same_but_for_period(&other.surface, &best.surface);
+        (nearer && self.drawn(&other.surface).0 > PART * self.drawn(&best.surface).0).then_some((other, margin))
+    }
+
+    /// What drawing a locked net explains of the picture, and how it is drawn best.
+    fn drawn(&mut self, surface: &Surface) -> (f64, Polarity, f64) {
+        let level = self.view.level_for(self.short_px(surface.depth), 12.0);
+        let cell = self.cell_px(surface.depth);
+        self.gain(surface, level, cell, &Polarity::BOTH, &[1.2])
     }
 
     /// Locks again from other tilts about the one found, and keeps what agrees best. Bent sheets have more than one tilt from which the phases
@@ -299,13 +322,16 @@ impl Workspace {
     }
 }
 
-/// Whether two lattices may be one net seen with different periods: the same plane, at depths at which harmonics coincide.
+/// Whether two lattices may be one net seen with different periods: the same plane and twines along the same ways, at depths at which harmonics coincide.
 fn same_but_for_period(a: &Surface, b: &Surface) -> bool {
     /// What the search leaves open, rad and as part of the depth.
     const TURN: f64 = 0.07;
     const DEPTH: f64 = 0.03;
     let turned = a.normal().angle(&b.normal());
+    let along = |s: &Surface, t: &Surface| {
+        s.twines().iter().all(|way| t.twines().iter().any(|other| way.dot(other).abs() > f64::cos(2.0 * TURN)))
+    };
     let simple = |m: u8, n: u8| m == 1 || n == 1 || m + n <= 5;
     let coincide = |m: u8, n: u8| (a.depth * f64::from(n) / (b.depth * f64::from(m)) - 1.0).abs() < DEPTH;
-    turned < TURN && (1..=7).any(|m| (1..=7).any(|n| simple(m, n) && coincide(m, n)))
+    turned < TURN && along(a, b) && (1..=7).any(|m| (1..=7).any(|n| simple(m, n) && coincide(m, n)))
 }

@@ -38,6 +38,12 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Unit vectors along the two families of twines on the axis, camera frame.
+    pub(crate) fn twines(&self) -> [Vector3<f64>; 2] {
+        let (sine, cosine) = f64::sin_cos(0.5 * (std::f64::consts::FRAC_PI_2 - self.angle));
+        [Vector3::new(cosine, sine, 0.0), Vector3::new(sine, cosine, 0.0)].map(|way| self.rotation * way)
+    }
+
     /// A flat sheet whose nodes are at whole coordinates on the axis.
     pub(crate) fn flat(rotation: Matrix3<f64>, depth: f64, angle: f64, sides: [f64; 2]) -> Self {
         Self { rotation, depth, offset: [0.0; 2], angle, height: [0.0; 12], bending: [0.0; 2], sides }
