@@ -59,9 +59,7 @@ impl Workspace {
                 if k >= MOST || c.score < PART * score || same_but_for_period(&start, net) {
                     continue;
                 }
-            } else if k >= CANDIDATES.1
-                || k >= CANDIDATES.0 && locks.iter().any(|l| l.evidence.v[0].min(l.evidence.v[1]) > 5.0)
-            {
+            } else if k >= CANDIDATES.1 || k >= CANDIDATES.0 && locks.iter().any(|l| l.coherence() > 5.0) {
                 break;
             }
             let mut seeded = start;
@@ -131,11 +129,10 @@ impl Workspace {
     /// Between lattices that are there beyond doubt, two nets or periods of one, the drawing's gain decides. What a fish or a shadow is explained by counts
     /// for nothing, so in doubt it is how high a candidate stood in the search, how far above its background, and how well the tiles agree.
     fn best_lock(locks: &[Lock]) -> Option<Lock> {
-        let v = |l: &Lock| l.evidence.v[0].min(l.evidence.v[1]);
-        if let Some(top) = locks.iter().filter(|l| v(l) > SURE).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+        if let Some(top) = locks.iter().filter(|l| l.coherence() > SURE).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
             return Some(*top);
         }
-        let coherence = |l: &Lock| v(l) + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());
+        let coherence = |l: &Lock| l.coherence() + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());
         let merit = |l: &Lock| 0.3 * l.score + 0.5 * l.above + coherence(l);
         locks.iter().max_by(|a, b| merit(a).total_cmp(&merit(b))).copied()
     }
@@ -143,10 +140,12 @@ impl Workspace {
     /// The best lock on another net than the best lock is on, if both are there beyond doubt. Of its lines every second may have been locked to: then it has
     /// half of the gain that it will have.
     fn another_net(locks: &[Lock], best: &Lock) -> Option<Lock> {
-        let sure = |l: &Lock| l.evidence.v[0].min(l.evidence.v[1]) > SURE;
-        let another =
-            |l: &&Lock| sure(l) && !same_but_for_period(&l.surface, &best.surface) && l.gain > 0.5 * PART * best.gain;
-        locks.iter().filter(another).filter(|_| sure(best)).max_by(|a, b| a.gain.total_cmp(&b.gain)).copied()
+        let another = |l: &&Lock| {
+            l.coherence().min(best.coherence()) > SURE
+                && !same_but_for_period(&l.surface, &best.surface)
+                && l.gain > 0.5 * PART * best.gain
+        };
+        locks.iter().filter(another).max_by(|a, b| a.gain.total_cmp(&b.gain)).copied()
     }
 
     /// Of two nets the nearer one is what a vehicle drifts into; which one that is tell their true periods. `other` with its period if it is nearer than `best`

@@ -111,6 +111,13 @@ pub(crate) struct Lock {
     pub focus: f64,
 }
 
+impl Lock {
+    /// Coherence of the family that agrees less: what both have.
+    pub(crate) fn coherence(&self) -> f64 {
+        self.evidence.v[0].min(self.evidence.v[1])
+    }
+}
+
 impl Workspace {
     pub(crate) fn new(camera: &Camera, mesh: &Mesh, config: &Config, view: View) -> Self {
         let mut banks = Vec::new();

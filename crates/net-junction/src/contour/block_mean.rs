@@ -5,8 +5,8 @@ use net_image::Image;
 /// Side of the squares over which the block's size is constant, px.
 pub(crate) const TILE: usize = 16;
 
-/// Largest pixel.
-const VALUE_MAX: usize = 4080;
+/// Largest pixel: 255 grey levels in sixteenths.
+pub(crate) const VALUE_MAX: usize = 4080;
 
 /// By how many bits `number` has to be shifted down not to exceed `most`.
 const fn bits_over(number: usize, most: usize) -> u32 {

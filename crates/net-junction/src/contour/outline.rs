@@ -69,6 +69,7 @@ impl<'a> Outline<'a> {
 /// Finds outlines' convex hulls; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Huller {
+    /// Crossings left by one thinning, and by the next.
     turns: [Vec<Crossing>; 2],
     /// The hull of the crossings so far, its latest corner at both ends; grows at both.
     chain: Vec<Crossing>,
@@ -95,12 +96,12 @@ impl Huller {
         self.hull.clear();
         let mut crossings = outline.crossings;
         if outline.gapless {
-            // Each look at all crossings that needs no guess at where the border turns leaves half of them.
-            let [once, twice] = &mut self.turns;
-            outward_turns(crossings, once);
-            outward_turns(once, twice);
-            outward_turns(twice, once);
-            crossings = once;
+            // Each thinning leaves about half, and needs no guess at where the border turns.
+            let [here, there] = &mut self.turns;
+            outward_turns(crossings, here);
+            outward_turns(here, there);
+            outward_turns(there, here);
+            crossings = here;
         }
         let Some((first, second, next)) = first_corners(crossings) else { return &self.hull };
         // It grows by at most one corner at either end for each crossing.

@@ -3,7 +3,7 @@
 use net_geometry::nalgebra::Vector2;
 use net_image::{GrayView, Image};
 
-use crate::contour::block_mean::{BlockMean, TILE, rounded};
+use crate::contour::block_mean::{BlockMean, TILE, VALUE_MAX, rounded};
 use crate::contour::config::{Config, LocalMean};
 use crate::contour::level::Level;
 
@@ -191,6 +191,7 @@ impl Threshold {
         let (wide, high) = (self.tiles_wide, self.tiles_high);
         self.spread.clear();
         self.spread.resize(wide * high, 0.0);
+        // Nothing is summed where nothing of it would count.
         let rows = if config.offset_deviations > 0.0 { height } else { 0 };
         for v in 0..rows {
             for (tile, part) in self.deviation.row(v).chunks(TILE).enumerate() {
@@ -207,7 +208,7 @@ impl Threshold {
                 let sum: f32 = (top..bottom).map(|r| self.spread[r * wide..][left..right].iter().sum::<f32>()).sum();
                 let pixels = ((right * TILE).min(width) - left * TILE) * ((bottom * TILE).min(height) - top * TILE);
                 let offset = config.offset_deviations as f32 * sum / pixels as f32;
-                self.offsets.push(offset.max((config.offset_grey * SCALE) as f32).min(4080.0));
+                self.offsets.push(offset.max((config.offset_grey * SCALE) as f32).min(VALUE_MAX as f32));
             }
         }
     }

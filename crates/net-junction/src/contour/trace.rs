@@ -204,7 +204,7 @@ impl<'a> pulp::WithSimd for Cracks<'a> {
         let outer = |levels: Levels| levels as i32 >> 16;
         for (to, (&place, &levels)) in self.crossings.iter_mut().zip(self.places.iter().zip(self.levels)) {
             let (odd, second) = bits(place);
-            // inner < 0 <= outer; the frame's level is no measurement.
+            // inner < 0 <= outer, and neither is beyond 8160 (255 grey levels and the offset, in sixteenths): the part is above 0 and below a whole one. The frame's level is no measurement.
             let (inner, outer) = ((levels << 16) as i32 >> 16, outer(levels));
             let part = (inner as f32 + 0.5) * Crossing::PARTS as f32 / (inner - outer) as f32;
             let part = if outer == i32::from(FRAME) { Crossing::PARTS / 2 } else { i32::from(rounded(part)) };
