@@ -4,7 +4,7 @@ use net_geometry::Plane;
 use net_geometry::nalgebra::{Matrix3, Vector3};
 
 use crate::config::Config;
-use crate::covariance;
+use crate::covariance::{self, Doubt};
 use crate::decision::Evidence;
 use crate::estimate::{Labels, LatticeEstimate};
 use crate::model::{self, Model};
@@ -29,24 +29,6 @@ impl Workspace {
         let (fit, robust) = self.likelihood(surface, lock, model, 1, false)?;
         let surface = fit.surface;
         let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
-        let count = model.parameters();
-        let reach =
-            REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
-        let t = &mut self.tools;
-        let scale = model::robust_scale(t.fitter.whiten(&t.observations), &mut t.scratch);
-        let c = covariance::parameters(
-            &t.fitter,
-            &surface,
-            &t.observations,
-            robust,
-            &fit.covariance,
-            count,
-            scale,
-            config.side_ratio_sigma,
-            reach,
-            &mut t.scores,
-        );
-        let errors = covariance::pose(&surface, &labels, &c, count);
         let scale = if followed { Self::coarse_scale_for } else { Self::scale_for };
         let place = scale(self, surface.depth);
         let evidence = self.weigh(&surface, place, lock);
@@ -57,6 +39,21 @@ impl Workspace {
         let evidence = Evidence { above: lock.above, ..evidence };
         let bend = mean_plane.normal.angle(&surface.normal());
         let evidence = evidence.bent(bend, surface.sides, surface.depth, config.height_length_m);
+        let reach =
+            REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
+        let t = &mut self.tools;
+        let scale = model::robust_scale(t.fitter.whiten(&t.observations), &mut t.scratch);
+        let doubt = Doubt { scale, reach, side_ratio: config.side_ratio_sigma, bumps: evidence.bumps };
+        let errors = covariance::errors(
+            &t.fitter,
+            &fit,
+            model.parameters(),
+            &t.observations,
+            robust,
+            &labels,
+            &doubt,
+            &mut t.influences,
+        );
         let odd = labels.turns % 2 == 1;
         Some(LatticeEstimate {
             pose: labels.pose(&surface),

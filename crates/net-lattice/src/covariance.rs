@@ -1,9 +1,11 @@
 //! From the covariance of the sheet's parameters to that of the pose.
 
-use net_geometry::nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
+use std::ops::AddAssign;
+
+use net_geometry::nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use crate::estimate::Labels;
-use crate::fit::{Fitter, Observation, Robust};
+use crate::fit::{Fit, Fitter, Influence, Observation, Robust};
 use crate::surface::{PARAMETERS, Params, Surface};
 
 /// What is known of the errors of an estimate.
@@ -17,70 +19,64 @@ pub(crate) struct Errors {
     pub angle: f64,
 }
 
-/// Covariance of the first `count` parameters: the formal one times the squared residual scale (a sheet that does not fit knows less), plus
-/// what residuals that are alike over `reach` px do ([`Fitter::scores`]: a sheet that bends otherwise than the model), plus what sides that
-/// differ by `side_ratio` would do (considered, not estimated: it cannot be told from tilt and bend reliably).
-pub(crate) fn parameters(
+/// What makes errors besides the observations' noise.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Doubt {
+    /// Residual scale, in units of what the observations claim.
+    pub scale: f64,
+    /// Distance over which residuals may be alike, px.
+    pub reach: f64,
+    /// Standard deviation of the ratio of the sides.
+    pub side_ratio: f64,
+    /// Angle by which bumps too short for the sheet may turn the normal on the axis, rad.
+    pub bumps: f64,
+}
+
+/// Share of the formal covariance that is counted in any case: what the residuals of a few tiles show may be next to nothing by chance. Simulated flat nets
+/// have an error squared per degree of freedom of 1.0 to 1.2 without it, and of 0.4 with all of it, since it is in the residuals a second time.
+const FORMAL: f64 = 0.15;
+
+/// Errors of a fit of the first `count` parameters: what residuals that are alike do ([`Fitter::alike`]: a sheet that bends otherwise than the model, and noise), a
+/// part of the formal covariance, and what sides of another ratio would do (considered, not estimated: it cannot be told from tilt and bend reliably).
+pub(crate) fn errors(
     fitter: &Fitter,
-    surface: &Surface,
+    fit: &Fit,
+    count: usize,
     observations: &[Observation],
     robust: Robust,
-    formal: &[[f64; PARAMETERS]; PARAMETERS],
-    count: usize,
-    scale: f64,
-    side_ratio: f64,
-    reach: f64,
-    scratch: &mut Vec<(usize, Params)>,
-) -> [[f64; PARAMETERS]; PARAMETERS] {
+    labels: &Labels,
+    doubt: &Doubt,
+    scratch: &mut Vec<Influence>,
+) -> Errors {
+    let (surface, formal) = (&fit.surface, &fit.covariance);
     // One family longer by the ratio, the other shorter: coordinates change in proportion to their distance from the axis.
+    let chart = surface.chart();
     let stretch = |o: &Observation| {
-        let chart = surface.chart();
         chart
             .at(o.site.ray[0], o.site.ray[1])
             .map_or([0.0; 2], |p| [p.s[0] - surface.offset[0], surface.offset[1] - p.s[1]])
     };
     let pull = fitter.pull(count, observations, robust, stretch);
-    let mut consider = [0.0; PARAMETERS];
-    for a in 0..count {
-        consider[a] = side_ratio * (0..count).map(|b| formal[a][b] * pull[b]).sum::<f64>();
-    }
-    let s2 = scale.max(0.3).powi(2);
-    let alike = sandwich(formal, &fitter.scores(count, observations, robust, reach, scratch), count);
-    let mut c = *formal;
+    let consider: Params = std::array::from_fn(|a| {
+        doubt.side_ratio * formal[a].iter().zip(&pull).take(count).map(|(c, pull)| c * pull).sum::<f64>()
+    });
+    let noise = FORMAL * doubt.scale.max(0.3).powi(2);
+    let mut c = fitter.alike(count, observations, robust, formal, doubt.reach, scratch);
     for a in 0..count {
         for b in 0..count {
-            c[a][b] = s2 * formal[a][b] + alike[a][b] + consider[a] * consider[b];
+            c[a][b] += noise * formal[a][b] + consider[a] * consider[b];
         }
     }
-    c
+    pose(surface, labels, &c, count, doubt.bumps)
 }
 
-/// `a m a` over the first `count` rows and columns.
-fn sandwich(
-    a: &[[f64; PARAMETERS]; PARAMETERS],
-    m: &[[f64; PARAMETERS]; PARAMETERS],
-    count: usize,
-) -> [[f64; PARAMETERS]; PARAMETERS] {
-    let times = |x: &[[f64; PARAMETERS]; PARAMETERS], y: &[[f64; PARAMETERS]; PARAMETERS]| {
-        let mut z = [[0.0; PARAMETERS]; PARAMETERS];
-        for i in 0..count {
-            for k in 0..count {
-                for j in 0..count {
-                    z[i][j] += x[i][k] * y[k][j];
-                }
-            }
-        }
-        z
-    };
-    times(&times(a, m), a)
-}
-
-/// Carries it over to the pose in the net frame, by differences.
-pub(crate) fn pose(
+/// From the parameters to the pose in the net frame, by differences.
+fn pose(
     surface: &Surface,
     labels: &Labels,
     covariance: &[[f64; PARAMETERS]; PARAMETERS],
     count: usize,
+    bumps: f64,
 ) -> Errors {
     let base = labels.pose(surface);
     let mut j = SMatrix::<f64, 6, PARAMETERS>::zeros();
@@ -103,6 +99,8 @@ pub(crate) fn pose(
     let mut pose: Matrix6<f64> = j * c * j.transpose();
     pose = 0.5 * (pose + pose.transpose());
     let normal: Vector3<f64> = surface.normal();
+    let tilted = bumps * bumps * (Matrix3::identity() - normal * normal.transpose());
+    pose.fixed_view_mut::<3, 3>(0, 0).add_assign(&tilted);
     let turn = pose.fixed_view::<3, 3>(0, 0).into_owned();
     let tilt = (0.5 * (turn.trace() - normal.dot(&(turn * normal)))).max(0.0).sqrt();
     let shift = pose.fixed_view::<3, 3>(3, 3).into_owned();

@@ -45,16 +45,18 @@ pub(crate) struct Choice {
 }
 
 /// Fits every model to the same observations and keeps the one with the least Bayesian information criterion (Cauchy cost).
+///
+/// `alike`: tiles whose residuals are one and the same: they count as one. Taken for as many, they would have any unevenness of the twine pass for a bend.
 pub(crate) fn choose(
     fitter: &mut Fitter,
     start: &Surface,
     observations: &[Observation],
     prior: &Prior,
-    richest: Model,
+    alike: f64,
     scratch: &mut Vec<f64>,
 ) -> Option<Choice> {
     let mut best: Option<(f64, Choice)> = None;
-    for model in Model::ALL.into_iter().rev().filter(|m| *m <= richest) {
+    for model in Model::ALL.into_iter().rev() {
         let count = model.parameters();
         let from = start.truncated(count, prior.angle);
         let Some(fit) = fitter.fit(&from, count, observations, Robust::Tile(0.08), prior, 6) else { continue };
@@ -67,7 +69,7 @@ pub(crate) fn choose(
         let scale = robust_scale(whitened, scratch);
         let cost: f64 =
             whitened.iter().map(|s| 2.0 * (0.25 * (s / scale).powi(2)).ln_1p()).sum::<f64>() + n as f64 * scale.ln();
-        let bic = 2.0 * cost + count as f64 * (n as f64).ln();
+        let bic = 2.0 * cost / alike + count as f64 * (n as f64 / alike).ln();
         if best.as_ref().is_none_or(|(b, _)| bic < *b) {
             best = Some((bic, Choice { model, fit }));
         }

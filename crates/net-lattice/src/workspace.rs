@@ -8,7 +8,7 @@ use crate::comb::{Comb, LOOKS, Looks};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
-use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
+use crate::fit::{Fit, Fitter, Influence, Observation, Prior, Robust};
 use crate::fold::{Fold, Folder};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
 use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};
@@ -22,7 +22,7 @@ use crate::smooth::Smoother;
 use crate::spectra::{Bank, Spectra};
 use crate::spread::Spread;
 use crate::stages::Stages;
-use crate::surface::{self, Params, Surface};
+use crate::surface::{self, Surface};
 use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
@@ -70,7 +70,7 @@ pub(crate) struct Tools {
     pub likelihood: Likelihood,
     pub histogram: Vec<u32>,
     pub scratch: Vec<f64>,
-    pub scores: Vec<(usize, Params)>,
+    pub influences: Vec<Influence>,
     pub folder: Folder,
     pub spread: Spread,
     /// Tiles, of this tiling, that a comparison of drawings looks at; empty for all.
