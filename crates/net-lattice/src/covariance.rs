@@ -4,8 +4,9 @@ use std::ops::AddAssign;
 
 use net_geometry::nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
+use crate::alike::Influence;
 use crate::estimate::Labels;
-use crate::fit::{Fit, Fitter, Influence, Observation, Robust};
+use crate::fit::{Fit, Fitter, Observation, Robust};
 use crate::surface::{PARAMETERS, Params, Surface};
 
 /// What is known of the errors of an estimate.

@@ -222,11 +222,11 @@ impl Evidence {
         let snr = self.cell_snr.max(1e-6);
         let least = (0.955 - 0.035 * (weaker - 3.0).max(0.0) - 0.5 / snr).max(0.82);
         let twine = logistic((self.separable - least) / 0.01);
-        // Of bricks the weaker family has a sixth of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well, and so
+        // Of bricks the weaker family has a sixth to a third of the power of the stronger, and a twentieth to a sixth differs. Noise makes cells differ as well, and so
         // do the pixels of a clean net, whose second harmonic is strong; where it is not, cells must be more alike.
         let strong = ((weaker - 5.0) / 5.0).clamp(0.0, 1.0);
         let differs = 0.02 + 0.03 * strong + (1.5 - 0.3 * strong) / snr;
-        let limit = (0.01 + 0.2 * self.balance).min(differs).min(0.1);
+        let limit = (0.01 + 0.15 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
         // A bend that nearly every tile agrees on is the net's, and may be as large as the answer's tolerance; else it may be the fit's alone.
         let agreed = ((self.comb_good - 0.7) / 0.2).clamp(0.0, 1.0);

@@ -23,7 +23,7 @@ pub(crate) enum Robust {
 
 impl Robust {
     /// The information left to a tile with residuals `r`.
-    fn weigh(self, mut w: [f64; 3], r: [f64; 2]) -> [f64; 3] {
+    pub(crate) fn weigh(self, mut w: [f64; 3], r: [f64; 2]) -> [f64; 3] {
         match self {
             Self::Family(scale) => {
                 let down = |r: f64| 1.0 / (1.0 + (r / scale).powi(2)).powi(2);
@@ -55,40 +55,10 @@ pub(crate) struct Fit {
     pub covariance: [[f64; PARAMETERS]; PARAMETERS],
 }
 
-/// What one tile does to the parameters.
-#[derive(Debug, Clone)]
-pub(crate) struct Influence {
-    pixel: [f64; 2],
-    /// Derivatives of both coordinates by the parameters.
-    row: [Params; 2],
-    /// Change of the parameters by one cell of each coordinate.
-    by: [Params; 2],
-    /// Change of the parameters by the tile's residuals.
-    shift: Params,
-    /// `by` summed over the tiles that are alike.
-    near: [Params; 2],
-}
-
-/// Share of a parameter's variance that the residuals show, below which it is not raised any more.
-const LEFT: f64 = 0.1;
-
-/// The first `count` parameters from a function, the others zero.
-fn from(count: usize, of: impl Fn(usize) -> f64) -> Params {
-    std::array::from_fn(|k| if k < count { of(k) } else { 0.0 })
-}
-
-fn dot(count: usize, a: &Params, b: &Params) -> f64 {
-    a.iter().zip(b).take(count).map(|(a, b)| a * b).sum()
-}
-
-fn add(count: usize, sum: &mut Params, w: f64, a: &Params) {
-    sum.iter_mut().zip(a).take(count).for_each(|(s, a)| *s += w * a);
-}
-
 /// Buffers of the fit.
 #[derive(Debug, Default)]
 pub(crate) struct Fitter {
-    jacobian: Vec<[[f64; PARAMETERS]; 2]>,
+    pub jacobian: Vec<[Params; 2]>,
     /// Depth at each site.
     depth: Vec<f64>,
     /// Residuals of the last iteration, before its step; NaN where the sheet is not seen.
@@ -210,83 +180,6 @@ impl Fitter {
             }
         }
         pull
-    }
-
-    /// Covariance of the parameters by residuals of the last linearization that are alike over `reach` px: a sheet that bends in a way the model cannot leaves
-    /// such (Conley 1999, Bartlett's kernel along u and v). A fit leaves less of them than there were, the less the richer the model: each parameter's share is
-    /// raised by what this fit would take from a field of residuals alike as the kernel says. `formal`: covariance of the fit.
-    pub(crate) fn alike(
-        &self,
-        count: usize,
-        observations: &[Observation],
-        robust: Robust,
-        formal: &[[f64; PARAMETERS]; PARAMETERS],
-        reach: f64,
-        influences: &mut Vec<Influence>,
-    ) -> [[f64; PARAMETERS]; PARAMETERS] {
-        influences.clear();
-        for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&self.jacobian) {
-            if r[0].is_nan() {
-                continue;
-            }
-            let w = robust.weigh(o.weight, *r);
-            let score =
-                [[w[0], w[1]], [w[1], w[2]]].map(|w| -> Params { from(count, |k| w[0] * j[0][k] + w[1] * j[1][k]) });
-            let by = score.map(|s| -> Params { from(count, |k| dot(count, &formal[k], &s)) });
-            let shift = from(count, |k| by[0][k] * r[0] + by[1][k] * r[1]);
-            influences.push(Influence { pixel: o.site.pixel, row: *j, by, shift, near: [[0.0; PARAMETERS]; 2] });
-        }
-        let kernel = |a: &Influence, b: &Influence| {
-            let along = |axis: usize| (1.0 - (a.pixel[axis] - b.pixel[axis]).abs() / reach).max(0.0);
-            along(0) * along(1)
-        };
-        let mut sum = [[0.0; PARAMETERS]; PARAMETERS];
-        // What the parameters' covariance would be of a field of variance 1.
-        let mut field = [[0.0; PARAMETERS]; PARAMETERS];
-        for t in 0..influences.len() {
-            let (mut shift, mut near) = ([0.0; PARAMETERS], [[0.0; PARAMETERS]; 2]);
-            for other in influences.iter() {
-                let w = kernel(&influences[t], other);
-                if w > 0.0 {
-                    add(count, &mut shift, w, &other.shift);
-                    near.iter_mut().zip(&other.by).for_each(|(n, b)| add(count, n, w, b));
-                }
-            }
-            let tile = &mut influences[t];
-            tile.near = near;
-            for a in 0..count {
-                add(count, &mut sum[a], tile.shift[a], &shift);
-                (0..2).for_each(|f| add(count, &mut field[a], tile.by[f][a], &near[f]));
-            }
-        }
-        // What of it the residuals that the fit leaves would make.
-        let mut left = [0.0; PARAMETERS];
-        for one in influences.iter() {
-            let through: [Params; 2] = one.row.map(|row| from(count, |k| dot(count, &row, &field[k])));
-            for other in influences.iter() {
-                let w = kernel(one, other);
-                if w <= 0.0 {
-                    continue;
-                }
-                for f in 0..2 {
-                    for g in 0..2 {
-                        let together = if f == g { w } else { 0.0 }
-                            - dot(count, &one.row[f], &other.near[g])
-                            - dot(count, &one.near[f], &other.row[g])
-                            + dot(count, &through[f], &other.row[g]);
-                        for k in 0..count {
-                            left[k] += w * together * one.by[f][k] * other.by[g][k];
-                        }
-                    }
-                }
-            }
-        }
-        let raise: Params =
-            from(count, |k| (field[k][k] / left[k].max(LEFT * field[k][k]).max(f64::MIN_POSITIVE)).sqrt());
-        for (a, row) in sum.iter_mut().enumerate() {
-            row.iter_mut().zip(&raise).for_each(|(s, r)| *s *= raise[a] * r);
-        }
-        sum
     }
 
     /// Fits the first `count` parameters. `None` when the sheet runs away.

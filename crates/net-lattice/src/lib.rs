@@ -42,6 +42,7 @@
 // Dense matrix code reads best with its indices.
 #![allow(clippy::needless_range_loop)]
 
+mod alike;
 mod background;
 mod cold;
 mod comb;

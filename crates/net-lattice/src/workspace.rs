@@ -3,12 +3,13 @@
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
+use crate::alike::Influence;
 use crate::background::Background;
 use crate::comb::{Comb, LOOKS, Looks};
 use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::Followed;
-use crate::fit::{Fit, Fitter, Influence, Observation, Prior, Robust};
+use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
 use crate::fold::{Fold, Folder};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
 use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};

@@ -1,0 +1,189 @@
+//! Residuals of neighbouring tiles that are alike, and what they do to the parameters of a fit.
+
+use crate::fit::{Fitter, Observation, Robust};
+use crate::surface::{PARAMETERS, Params};
+
+/// What one tile does to the parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Influence {
+    pixel: [f64; 2],
+    /// Derivatives of both coordinates by the parameters.
+    row: [Params; 2],
+    /// Change of the parameters by one cell of each coordinate.
+    by: [Params; 2],
+    /// Change of the parameters by the tile's residuals.
+    shift: Params,
+    /// `by` summed over the tiles that are alike.
+    near: [Params; 2],
+}
+
+/// Share of a parameter's variance that the residuals show, below which it is not raised any more.
+const LEFT: f64 = 0.1;
+
+/// The first `count` parameters from a function, the others zero.
+fn from(count: usize, of: impl Fn(usize) -> f64) -> Params {
+    std::array::from_fn(|k| if k < count { of(k) } else { 0.0 })
+}
+
+fn dot(count: usize, a: &Params, b: &Params) -> f64 {
+    a.iter().zip(b).take(count).map(|(a, b)| a * b).sum()
+}
+
+fn add(count: usize, sum: &mut Params, w: f64, a: &Params) {
+    sum.iter_mut().zip(a).take(count).for_each(|(s, a)| *s += w * a);
+}
+
+impl Fitter {
+    /// Covariance of the parameters by residuals of the last linearization that are alike over `reach` px: a sheet that bends in a way the model cannot leaves
+    /// such (Conley 1999, Bartlett's kernel along u and v). A fit leaves less of them than there were, the less the richer the model: each parameter's share is
+    /// raised by what this fit would take from a field of residuals alike as the kernel says. `formal`: covariance of the fit.
+    pub(crate) fn alike(
+        &self,
+        count: usize,
+        observations: &[Observation],
+        robust: Robust,
+        formal: &[[f64; PARAMETERS]; PARAMETERS],
+        reach: f64,
+        influences: &mut Vec<Influence>,
+    ) -> [[f64; PARAMETERS]; PARAMETERS] {
+        influences.clear();
+        for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&self.jacobian) {
+            if r[0].is_nan() {
+                continue;
+            }
+            let w = robust.weigh(o.weight, *r);
+            let score =
+                [[w[0], w[1]], [w[1], w[2]]].map(|w| -> Params { from(count, |k| w[0] * j[0][k] + w[1] * j[1][k]) });
+            let by = score.map(|s| -> Params { from(count, |k| dot(count, &formal[k], &s)) });
+            let shift = from(count, |k| by[0][k] * r[0] + by[1][k] * r[1]);
+            influences.push(Influence { pixel: o.site.pixel, row: *j, by, shift, near: [[0.0; PARAMETERS]; 2] });
+        }
+        let kernel = |a: &Influence, b: &Influence| {
+            let along = |axis: usize| (1.0 - (a.pixel[axis] - b.pixel[axis]).abs() / reach).max(0.0);
+            along(0) * along(1)
+        };
+        let mut sum = [[0.0; PARAMETERS]; PARAMETERS];
+        // What the parameters' covariance would be of a field of variance 1.
+        let mut field = [[0.0; PARAMETERS]; PARAMETERS];
+        for t in 0..influences.len() {
+            let (mut shift, mut near) = ([0.0; PARAMETERS], [[0.0; PARAMETERS]; 2]);
+            for other in influences.iter() {
+                let w = kernel(&influences[t], other);
+                if w > 0.0 {
+                    add(count, &mut shift, w, &other.shift);
+                    near.iter_mut().zip(&other.by).for_each(|(n, b)| add(count, n, w, b));
+                }
+            }
+            let tile = &mut influences[t];
+            tile.near = near;
+            for a in 0..count {
+                add(count, &mut sum[a], tile.shift[a], &shift);
+                (0..2).for_each(|f| add(count, &mut field[a], tile.by[f][a], &near[f]));
+            }
+        }
+        // What of it the residuals that the fit leaves would make.
+        let mut left = [0.0; PARAMETERS];
+        for one in influences.iter() {
+            let through: [Params; 2] = one.row.map(|row| from(count, |k| dot(count, &row, &field[k])));
+            for other in influences.iter() {
+                let w = kernel(one, other);
+                if w <= 0.0 {
+                    continue;
+                }
+                for f in 0..2 {
+                    for g in 0..2 {
+                        let together = if f == g { w } else { 0.0 }
+                            - dot(count, &one.row[f], &other.near[g])
+                            - dot(count, &one.near[f], &other.row[g])
+                            + dot(count, &through[f], &other.row[g]);
+                        for k in 0..count {
+                            left[k] += w * together * one.by[f][k] * other.by[g][k];
+                        }
+                    }
+                }
+            }
+        }
+        let raise: Params =
+            from(count, |k| (field[k][k] / left[k].max(LEFT * field[k][k]).max(f64::MIN_POSITIVE)).sqrt());
+        for (a, row) in sum.iter_mut().enumerate() {
+            row.iter_mut().zip(&raise).for_each(|(s, r)| *s *= raise[a] * r);
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use net_geometry::nalgebra::Matrix3;
+    use net_geometry::{Camera, Lens};
+
+    use super::*;
+    use crate::fit::Prior;
+    use crate::surface::Surface;
+    use crate::view::Site;
+
+    /// Tiles along u and v, as in a picture of 848 x 480 px.
+    const TILES: [usize; 2] = [16, 9];
+    const SPACING: f64 = 53.0;
+    const TRIALS: usize = 300;
+
+    /// A field of variance 1 whose covariance is Bartlett's kernel over three tiles: the mean of 3 x 3 independent values.
+    fn field(random: &mut impl FnMut() -> f64) -> Vec<f64> {
+        let wide = TILES[0] + 2;
+        let white: Vec<f64> = (0..wide * (TILES[1] + 2)).map(|_| random()).collect();
+        let at = |x: usize, y: usize| (0..9).map(|k| white[(y + k / 3) * wide + x + k % 3]).sum::<f64>() / 3.0;
+        (0..TILES[1]).flat_map(|y| (0..TILES[0]).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect()
+    }
+
+    #[test]
+    fn what_a_fit_swallows_is_counted() {
+        let camera = Camera::new(600.0, 600.0, 423.5, 239.5, 848, 480, Lens::None).expect("fixed and sound");
+        let truth = Surface::flat(Matrix3::identity(), 1.0, 1.5, [0.05; 2]);
+        let chart = truth.chart();
+        let sites: Vec<Site> = (0..TILES[0] * TILES[1])
+            .map(|t| {
+                let (x, y) = ((t % TILES[0]) as f64, (t / TILES[0]) as f64);
+                Site::new(&camera, 26.0 + SPACING * x, 28.0 + SPACING * y)
+            })
+            .collect();
+        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5 };
+        prior.sigma[7..].fill(10.0);
+        let (mut fitter, mut influences) = (Fitter::default(), Vec::new());
+        // Knuth's linear congruence, to uniform values of variance 1.
+        let mut state = 7u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 12f64.sqrt()
+        };
+        // Flat and rhombic, quartic.
+        for count in [7, 19] {
+            let (mut said, mut done) = ([0.0; PARAMETERS], [0.0; PARAMETERS]);
+            for _ in 0..TRIALS {
+                let fields = [field(&mut random), field(&mut random)];
+                let observations: Vec<Observation> = sites
+                    .iter()
+                    .enumerate()
+                    .map(|(t, site)| {
+                        let s = chart.at(site.ray[0], site.ray[1]).expect("in view").s;
+                        let s = std::array::from_fn(|f| s[f] + 0.001 * fields[f][t]);
+                        Observation { site: *site, s, weight: [1e6, 0.0, 1e6] }
+                    })
+                    .collect();
+                let robust = Robust::Tile(1e3);
+                let fit = fitter.fit(&truth, count, &observations, robust, &prior, 2).expect("a sheet");
+                let c = fitter.alike(count, &observations, robust, &fit.covariance, 3.0 * SPACING, &mut influences);
+                let off = fit.surface.deviation(1.5);
+                let off = |k: usize| if k == 3 { fit.surface.depth.ln() } else { off[k] };
+                for k in (3..count).filter(|k| *k != 4 && *k != 5) {
+                    said[k] += c[k][k];
+                    done[k] += off(k).powi(2);
+                }
+            }
+            for k in (3..count).filter(|k| *k != 4 && *k != 5) {
+                let ratio = said[k] / done[k];
+                // A variance of 300 trials is known to 8 %, and the mean of what is said to as much.
+                assert!((0.75..1.33).contains(&ratio), "{ratio} of parameter {k} of {count}");
+            }
+        }
+    }
+}
