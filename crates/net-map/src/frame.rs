@@ -22,7 +22,7 @@ pub enum Seen {
     Unknown,
     /// There.
     Present,
-    /// Gone, or broken.
+    /// It looks gone, or broken, whether or not this frame alone could say so for certain.
     Missing,
     /// Behind a fish or another object.
     Hidden,

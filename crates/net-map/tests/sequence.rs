@@ -55,7 +55,7 @@ fn run(net: Net, frames: u32, config: &Config) -> Run {
                 seen: match t.state {
                     TwineState::Unknown => Seen::Unknown,
                     TwineState::Present => Seen::Present,
-                    TwineState::Missing => Seen::Missing,
+                    TwineState::Missing | TwineState::Doubtful => Seen::Missing,
                     TwineState::Hidden => Seen::Hidden,
                     TwineState::Fouled => Seen::Fouled,
                 },

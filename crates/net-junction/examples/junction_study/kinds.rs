@@ -15,6 +15,13 @@ type Make = fn(u64) -> Scenario;
 pub const KINDS: &[(&str, Make)] = &[
     ("flat, dark", |s| make(s, 0.0, |_, _| {})),
     ("flat, white", |s| make(s, 1.0, |_, _| {})),
+    ("faint, white", |s| make(s, 1.0, fade)),
+    ("faint, white, torn", |s| {
+        make(s, 1.0, |draw, scene| {
+            fade(draw, scene);
+            tear(draw, scene);
+        })
+    }),
     ("turbid", |s| make(s, 0.5, turbid)),
     ("low light", |s| {
         make(s, 0.5, |_, scene| {
@@ -101,6 +108,18 @@ fn make(seed: u64, white: f64, change: impl Fn(&mut Draw, &mut Scene)) -> Scenar
     };
     change(&mut draw, &mut scene);
     Scenario { seed, scene, ..Scenario::default() }
+}
+
+/// Light twine of uneven brightness before water that is brighter towards the light, there nearly as bright as the twine.
+fn fade(draw: &mut Draw, scene: &mut Scene) {
+    let twine = &mut scene.layers[0].net.twine;
+    twine.grey = draw.between(110.0, 150.0);
+    twine.variation = draw.between(0.08, 0.2);
+    let brightest = twine.grey * draw.between(0.5, 0.95);
+    scene.water.gradient_grey = draw.between(30.0, 70.0);
+    scene.water.veil_grey = brightest - 0.5 * scene.water.gradient_grey;
+    scene.water.attenuation_per_m = Water::attenuation_of_visibility(draw.between(5.0, 10.0));
+    scene.light.from_deg = draw.between(-180.0, 0.0);
 }
 
 fn turbid(draw: &mut Draw, scene: &mut Scene) {

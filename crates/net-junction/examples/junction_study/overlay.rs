@@ -39,6 +39,7 @@ pub fn draw(folder: &Path, sample: &Sample, adjuster: &NetAdjuster, suffix: &str
         let colour = match twine.state {
             TwineState::Present => continue,
             TwineState::Unknown => [255, 140, 0],
+            TwineState::Doubtful => [255, 0, 255],
             TwineState::Missing => [255, 0, 0],
             TwineState::Hidden => [80, 80, 255],
             TwineState::Fouled => [0, 160, 60],

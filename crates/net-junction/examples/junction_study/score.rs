@@ -35,6 +35,8 @@ pub struct Score {
     pub large: [usize; 2],
     pub single: [usize; 2],
     pub false_holes: usize,
+    /// Twines that are there and are called missing.
+    pub false_missing: usize,
 }
 
 impl Score {
@@ -54,6 +56,7 @@ impl Score {
         self.missing.extend(other.missing);
         self.intact.extend(other.intact);
         self.false_holes += other.false_holes;
+        self.false_missing += other.false_missing;
     }
     pub fn rmse(&self) -> f64 {
         (self.squares[0] / self.right.max(1) as f64).sqrt()
@@ -90,14 +93,15 @@ impl std::fmt::Display for Score {
         let (auc, found, _) = self.missing_twines();
         write!(
             f,
-            "cells {:4.1} px, {:4} visible, recall {:.3}, precision {:.4}, RMSE {:.3} ({:.3}), false holes {}",
+            "cells {:4.1} px, {:4} visible, recall {:.3}, precision {:.4}, RMSE {:.3} ({:.3}), false holes {}, twines {}",
             self.cell_px(),
             self.visible,
             self.recall(),
             self.precision(),
             self.rmse(),
             self.rmse_as_is(),
-            self.false_holes
+            self.false_holes,
+            self.false_missing
         )?;
         if !self.missing.is_empty() {
             write!(
@@ -204,20 +208,15 @@ pub fn score(adjuster: &NetAdjuster, sample: &Sample, truth: &impl LatticeMap, l
     score.missing.extend(sample.missing.iter().filter(|e| fair(e)).map(evidence));
     score.intact.extend(judged.iter().filter(|(e, _)| fair(e) && !sample.missing.contains(e)).map(|(_, llr)| *llr));
 
-    let found = holes(adjuster.twines().iter().filter(|t| t.state == TwineState::Missing).map(|t| {
-        let edge = renamed_edge(&naming, t);
-        (edge, (t.llr, t.contrast))
-    }));
-    let mut found_twines = BTreeSet::new();
-    for hole in found.iter().filter(|h| is_certain(h)) {
-        found_twines.extend(hole.iter().map(|(edge, _)| *edge));
-        score.false_holes += usize::from(!hole.iter().any(|(edge, _)| sample.missing.contains(edge)));
-    }
-    for hole in holes(sample.missing.iter().map(|e| (*e, (0.0, 0.0)))) {
-        if !hole.iter().all(|(edge, _)| fair(edge)) {
+    let found = adjuster.twines().iter().filter(|t| t.state == TwineState::Missing);
+    let found: BTreeSet<_> = found.map(|t| renamed_edge(&naming, t)).collect();
+    score.false_missing = found.difference(&sample.missing).count();
+    score.false_holes = holes(&found).iter().filter(|hole| hole.is_disjoint(&sample.missing)).count();
+    for hole in holes(&sample.missing) {
+        if !hole.iter().all(fair) {
             continue;
         }
-        let hit = usize::from(hole.iter().any(|(edge, _)| found_twines.contains(edge)));
+        let hit = usize::from(!hole.is_disjoint(&found));
         let counts = if hole.len() == 1 { &mut score.single } else { &mut score.large };
         counts[0] += hit;
         counts[1] += 1;
@@ -232,16 +231,13 @@ fn cell_px(map: &impl LatticeMap, (i, j): Index) -> Option<f64> {
     Some(a.perp(&b).abs() / a.norm().max(b.norm()))
 }
 
-/// A missing twine with its log likelihood ratio and its neighbourhood's contrast.
-type Missing = (Edge, (f32, f32));
-
 /// Missing twines joined by the meshes beside them.
-fn holes(missing: impl Iterator<Item = Missing>) -> Vec<Vec<Missing>> {
-    let mut holes: Vec<(BTreeSet<Index>, Vec<Missing>)> = Vec::new();
-    for (edge, evidence) in missing {
+fn holes(missing: &BTreeSet<Edge>) -> Vec<BTreeSet<Edge>> {
+    let mut holes: Vec<(BTreeSet<Index>, BTreeSet<Edge>)> = Vec::new();
+    for &edge in missing {
         let ((i, j), direction) = edge;
         let mut cells = BTreeSet::from([(i, j), if direction == 0 { (i, j - 1) } else { (i - 1, j) }]);
-        let mut twines = vec![(edge, evidence)];
+        let mut twines = BTreeSet::from([edge]);
         let (touching, apart): (Vec<_>, Vec<_>) = holes.into_iter().partition(|h| !h.0.is_disjoint(&cells));
         holes = apart;
         for (more_cells, more_twines) in touching {
@@ -251,11 +247,4 @@ fn holes(missing: impl Iterator<Item = Missing>) -> Vec<Vec<Missing>> {
         holes.push((cells, twines));
     }
     holes.into_iter().map(|h| h.1).collect()
-}
-
-/// By one picture alone: one twine that is certain, in a neighbourhood that stands out, or several together.
-fn is_certain(hole: &[Missing]) -> bool {
-    let several = hole.iter().filter(|(_, (llr, _))| *llr < -2.0).count();
-    hole.iter().any(|(_, (llr, contrast))| *llr < -5.0 && *contrast > 4.5)
-        || hole.iter().map(|(_, (llr, _))| llr).sum::<f32>() < -13.0 && several >= 3
 }

@@ -5,13 +5,13 @@ use crate::score::Score;
 
 pub fn print(kinds: &[Kind]) {
     println!(
-        "| picture | pictures | cells px | RMSE px | RMSE as is | recall | precision | false holes | estimated: refused | RMSE px | recall | precision | false holes | ms per 1000 nodes |"
+        "| picture | pictures | cells px | RMSE px | RMSE as is | recall | precision | false holes (twines) | estimated: refused | RMSE px | recall | precision | false holes (twines) | ms per 1000 nodes |"
     );
     println!("|{}", "---|".repeat(14));
     for kind in kinds {
         let (t, e) = (&kind.truly, &kind.estimated);
         print!(
-            "| {} | {} | {:.0} | {:.3} | {:.3} | {:.4} | {:.4} | {} |",
+            "| {} | {} | {:.0} | {:.3} | {:.3} | {:.4} | {:.4} | {} ({}) |",
             kind.name,
             kind.pictures,
             t.cell_px(),
@@ -19,10 +19,18 @@ pub fn print(kinds: &[Kind]) {
             t.rmse_as_is(),
             t.recall(),
             t.precision(),
-            t.false_holes
+            t.false_holes,
+            t.false_missing
         );
         if e.pictures > 0 || kind.refused > 0 {
-            let figures = format!("{:.3} | {:.4} | {:.4} | {}", e.rmse(), e.recall(), e.precision(), e.false_holes);
+            let figures = format!(
+                "{:.3} | {:.4} | {:.4} | {} ({})",
+                e.rmse(),
+                e.recall(),
+                e.precision(),
+                e.false_holes,
+                e.false_missing
+            );
             print!(" {} | {} |", kind.refused, if e.pictures > 0 { figures } else { "- | - | - | -".to_owned() });
         } else {
             print!(" - | - | - | - | - |");
@@ -31,7 +39,7 @@ pub fn print(kinds: &[Kind]) {
     }
     println!();
     println!(
-        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 (log likelihood ratio) | holes of 2 or more found | single twines found | false holes |"
+        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 (log likelihood ratio) | holes of 2 or more found | single twines found | false holes (twines) |"
     );
     println!("|{}", "---|".repeat(9));
     for kind in kinds {
@@ -46,13 +54,14 @@ pub fn print(kinds: &[Kind]) {
 fn print_missing(name: &str, pose: &str, score: &Score) {
     let (auc, found, threshold) = score.missing_twines();
     println!(
-        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} ({threshold:.1}) | {}/{} | {}/{} | {} |",
+        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} ({threshold:.1}) | {}/{} | {}/{} | {} ({}) |",
         score.missing.len(),
         score.intact.len(),
         score.large[0],
         score.large[1],
         score.single[0],
         score.single[1],
-        score.false_holes
+        score.false_holes,
+        score.false_missing
     );
 }

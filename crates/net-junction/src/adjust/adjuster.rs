@@ -144,6 +144,7 @@ impl NetAdjuster {
         }
         self.twine_m = look.twine_m;
         self.leave_out_unnamed();
+        self.presence.claim(&self.graph, &self.config);
         self.report();
         Ok(&self.junctions)
     }

@@ -21,8 +21,15 @@ pub struct AdjustConfig {
     pub bow: f64,
     /// Log likelihood ratio, present to missing, above which a twine counts as present.
     pub present_llr: f64,
-    /// Log likelihood ratio below which it counts as missing.
+    /// Log likelihood ratio below which it looks missing: of twines that are there some in a thousand do, where they are faint some in a hundred.
     pub missing_llr: f64,
+    /// Twines that look missing are, with those that share a mesh with them, when one of them is below this. One twine in some thousands is broken, and
+    /// a picture has thousands. Nearer to zero: more holes, false ones too.
+    pub hole_one_llr: f64,
+    /// And its neighbourhood stands out by this many standard deviations.
+    pub certain_contrast: f64,
+    /// Or when at least three below -2 come to this together.
+    pub hole_sum_llr: f64,
     /// How many standard deviations twine must stand out from control lines half a cell aside, for anything to be said at all.
     pub gate: f64,
 }
@@ -38,6 +45,9 @@ impl Default for AdjustConfig {
             bow: 0.012,
             present_llr: 3.0,
             missing_llr: -1.5,
+            hole_one_llr: -5.0,
+            certain_contrast: 4.5,
+            hole_sum_llr: -13.0,
             gate: 1.5,
         }
     }
@@ -66,7 +76,14 @@ impl AdjustConfig {
         within("bow", self.bow, 0.0, 1.0, "a number from 0 to 1")?;
         within("gate", self.gate, 0.0, 100.0, "a number from 0 to 100")?;
         within("present_llr", self.present_llr, 0.0, 1e3, "a number from 0 to 1000")?;
-        within("missing_llr", self.missing_llr, -1e3, 0.0, "a number from -1000 to 0")?;
+        for (field, value) in [
+            ("missing_llr", self.missing_llr),
+            ("hole_one_llr", self.hole_one_llr),
+            ("hole_sum_llr", self.hole_sum_llr),
+        ] {
+            within(field, value, -1e3, 0.0, "a number from -1000 to 0")?;
+        }
+        within("certain_contrast", self.certain_contrast, 0.0, 100.0, "a number from 0 to 100")?;
         Ok(())
     }
 }

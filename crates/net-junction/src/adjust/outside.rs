@@ -1,10 +1,14 @@
-//! What lies where twines are gone together: the net's end, where no net encloses them, or a fish, where most of them are hidden.
+//! What lies where twines are gone together: the net's end, where no net encloses them, a fish, where most of them are hidden, or a hole.
 
+use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::Graph;
 use crate::adjust::presence::{Twine, TwineState};
 
 /// Missing twines in a region that reaches the end of the picture, from which on it is the net's end and no hole.
 const TWINES: u32 = 8;
+
+/// Twines that make a hole together: log likelihood ratio of each, and how many it takes.
+const SEVERAL: (f32, u32) = (-2.0, 3);
 
 /// Hidden twines, at least as many as missing ones, that hide those too.
 const HIDDEN: u32 = 2;
@@ -17,6 +21,35 @@ pub(crate) struct Outside {
     missing: Vec<u32>,
     hidden: Vec<u32>,
     open: Vec<bool>,
+    evidence: Vec<Evidence>,
+}
+
+/// What the missing twines of a region say together.
+#[derive(Debug, Clone, Copy, Default)]
+struct Evidence {
+    /// Of log likelihood ratios.
+    sum: f32,
+    /// Twines below [`SEVERAL`].
+    several: u32,
+    /// Whether one of them is certain by itself.
+    certain: bool,
+}
+
+impl Evidence {
+    fn of(twine: &Twine, config: &AdjustConfig) -> Self {
+        let certain = f64::from(twine.llr) < config.hole_one_llr && f64::from(twine.contrast) > config.certain_contrast;
+        Self { sum: twine.llr, several: u32::from(twine.llr < SEVERAL.0), certain }
+    }
+
+    fn add(&mut self, other: Self) {
+        self.sum += other.sum;
+        self.several += other.several;
+        self.certain |= other.certain;
+    }
+
+    fn is_hole(&self, config: &AdjustConfig) -> bool {
+        self.certain || self.several >= SEVERAL.1 && f64::from(self.sum) < config.hole_sum_llr
+    }
 }
 
 impl Outside {
@@ -29,6 +62,21 @@ impl Outside {
         let covered = |t: &Twine| matches!(t.state, TwineState::Missing | TwineState::Hidden | TwineState::Fouled);
         self.join(graph, twines, |t| covered(t) || untold(t));
         self.change(graph, twines, TwineState::Hidden, |o, r| o.hidden[r] >= o.missing[r].max(HIDDEN));
+    }
+
+    /// Missing twines that do not make a hole together are doubtful: of the thousands in a picture, some look gone by chance.
+    pub fn claim(&mut self, graph: &Graph, twines: &mut [Twine], config: &AdjustConfig) {
+        let gone = |t: &Twine| t.state == TwineState::Missing;
+        self.join(graph, twines, gone);
+        self.evidence.clear();
+        self.evidence.resize(graph.nodes.len(), Evidence::default());
+        for twine in twines.iter().filter(|t| gone(t)) {
+            if let Some(cell) = beside(graph, twine)[0] {
+                let root = self.root(cell);
+                self.evidence[root].add(Evidence::of(twine, config));
+            }
+        }
+        self.change(graph, twines, TwineState::Doubtful, |o, r| !o.evidence[r].is_hole(config));
     }
 
     /// Joins the meshes on both sides of the twines that belong.

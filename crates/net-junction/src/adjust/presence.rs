@@ -36,8 +36,10 @@ pub enum TwineState {
     Unknown,
     /// There.
     Present,
-    /// Gone, or broken.
+    /// Gone, or broken, for certain: together with what else looks gone around it.
     Missing,
+    /// Looks gone, as some of a picture's thousands of twines do by chance. More pictures tell.
+    Doubtful,
     /// Behind a fish or another object.
     Hidden,
     /// Overgrown.
@@ -103,6 +105,11 @@ impl Presence {
         self.foreign.find(graph, &self.twine.level, &self.control.level);
         self.decide(graph, profiles, config);
         self.outside.mark(graph, &mut self.twines);
+    }
+
+    /// What looks gone is gone where it is certain.
+    pub fn claim(&mut self, graph: &Graph, config: &AdjustConfig) {
+        self.outside.claim(graph, &mut self.twines, config);
     }
 
     fn decide(&mut self, graph: &mut Graph, profiles: &Profiles, config: &AdjustConfig) {

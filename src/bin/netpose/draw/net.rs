@@ -24,7 +24,7 @@ const LEAST_GAP_PX: f64 = 7.0;
 fn stroke(state: TwineState) -> (Colour, f64, f64) {
     match state {
         TwineState::Present => (LINE, 1.0, 0.6),
-        TwineState::Unknown => (LINE, 1.0, 0.25),
+        TwineState::Unknown | TwineState::Doubtful => (LINE, 1.0, 0.25),
         TwineState::Missing => (MISSING, 2.0, 0.9),
         TwineState::Hidden => (HIDDEN, 1.0, 0.7),
         TwineState::Fouled => (FOULED, 2.0, 0.7),

@@ -62,7 +62,7 @@ fn look(t: &Twine, offset: (i32, i32)) -> TwineLook {
     let seen = match t.state {
         TwineState::Unknown => Seen::Unknown,
         TwineState::Present => Seen::Present,
-        TwineState::Missing => Seen::Missing,
+        TwineState::Missing | TwineState::Doubtful => Seen::Missing,
         TwineState::Hidden => Seen::Hidden,
         TwineState::Fouled => Seen::Fouled,
     };
