@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use net_geometry::{Camera, Lens};
 use net_junction::{AdjustConfig, ExpectedNet, NetAdjuster, TwineState};
-use net_sim::{Hole, Image, Layer, Light, Net, NetPose, Scene, Sensor, Simulator, Twine, Water};
+use net_sim::{Extent, Hole, Image, Layer, Light, Net, NetPose, Scene, Sensor, Simulator, Twine, Water};
 
 /// Node at the first end, and direction.
 type Edge = ((i32, i32), usize);
@@ -84,4 +84,25 @@ fn a_hole_in_faint_net_is_found_and_nothing_beside_it() {
     println!("{hit} of {all} twines");
     // Stubs hide the gap of some.
     assert!(4 * hit >= 3 * all, "{hit} of {all}");
+}
+
+#[test]
+fn a_hole_at_the_pictures_end_is_one_and_the_nets_end_is_none() {
+    let clear = |holes: Vec<Hole>, extent: Extent| {
+        let mut scene = faint(21, -90.0, holes);
+        let net = &mut scene.layers[0].net;
+        (net.twine.grey, net.twine.variation, net.extent) = (250.0, 0.05, extent);
+        judge(&scene, 21)
+    };
+    // The picture's upper end lies 11.2 cells from its middle: two dozen twines, of which the end cuts a few.
+    let verdict = clear(vec![Hole { i: 0.5, j: -9.0, radius_i: 2.4, radius_j: 2.4 }], Extent::default());
+    let hit = verdict.missing.intersection(&verdict.truly_missing).count();
+    println!("{hit} of {} twines", verdict.truly_missing.len());
+    assert!(verdict.missing.is_subset(&verdict.truly_missing), "{:?}", verdict.missing);
+    assert!(verdict.truly_missing.len() >= 20 && 2 * hit >= verdict.truly_missing.len(), "{hit}");
+    // A side and a corner of the net.
+    for extent in [Extent::Cells { i: [-60, 60], j: [-5, 60] }, Extent::Cells { i: [-8, 60], j: [-60, 6] }] {
+        let verdict = clear(Vec::new(), extent);
+        assert!(verdict.missing.is_empty(), "{:?}", verdict.missing);
+    }
 }

@@ -9,6 +9,8 @@ use crate::adjust::statistic::Statistic;
 pub(crate) const SHIFT: usize = 2;
 /// How far beside its line a twine is looked for before it is called missing, cells: the neighbouring one is a whole cell off.
 const BESIDE: f32 = 0.25;
+/// Amplitude below which half of a twine may be gone.
+const GONE: f32 = 0.3;
 /// Part of the twine, at each end, that is the knot's: of its length, and at least so many px.
 const KNOT: (f32, f32) = (0.12, 2.0);
 
@@ -60,18 +62,20 @@ impl Means {
     }
 }
 
-/// Per edge: amplitude with its knots, over the whole of it between them, the smallest over half of it, and structure there.
+/// Per edge: amplitude with its knots, over the whole of it between them, the smallest over half of it, and the least structure of a half that may be gone.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     pub full: Statistic,
     pub whole: Statistic,
     pub weakest: Statistic,
     pub structure: Vec<f32>,
-    /// Mean grey level there, on the half of the width next to the line: growth is not much wider than twine.
+    /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.
     pub level: Vec<f32>,
     /// First bin of the weakest half.
     weakest_from: Vec<usize>,
     row: Vec<f32>,
+    part: Vec<f32>,
+    structures: Vec<f32>,
 }
 
 impl Lines {
@@ -100,25 +104,28 @@ impl Lines {
                 dot(part, template) / energy
             }));
             self.full.values[e] = self.row.iter().sum::<f32>() / profiles.bins as f32;
+            self.structures.clear();
+            for b in bins.clone() {
+                self.part.clear();
+                self.part.extend_from_slice(&profiles.row(e, b)[first + SHIFT..][..width]);
+                remove_line(&mut self.part);
+                self.structures.push((dot(&self.part, &self.part) / width as f32).sqrt());
+            }
             // The weakest half: a broken twine leaves stubs.
-            let mut weakest = (f32::MAX, 0);
-            for (start, part) in self.row[bins.clone()].windows(window).enumerate() {
-                let sum: f32 = part.iter().sum();
-                if sum < weakest.0 {
-                    weakest = (sum, bins.start + start);
-                }
+            let amplitudes = self.row[bins.clone()].windows(window).map(|half| half.iter().sum::<f32>());
+            let weakest = amplitudes.clone().enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+            self.weakest.values[e] = weakest.1 / window as f32;
+            self.weakest_from[e] = bins.start + weakest.0;
+            // The quietest of those that may be gone: stubs hang beside the line.
+            let structures = self.structures.windows(window).map(|half| half.iter().sum::<f32>());
+            let gone = amplitudes.map(|sum| sum <= weakest.1.max(GONE * window as f32));
+            let quietest = structures.zip(gone).filter(|(_, gone)| *gone).map(|(structure, _)| structure);
+            self.structure[e] = quietest.fold(f32::MAX, f32::min) / window as f32;
+            let half = self.weakest_from[e]..self.weakest_from[e] + window;
+            let mut level = 0.0;
+            for b in half {
+                level += profiles.row(e, b)[first + SHIFT..][middle.clone()].iter().sum::<f32>();
             }
-            self.weakest.values[e] = weakest.0 / window as f32;
-            self.weakest_from[e] = weakest.1;
-            let (mut structure, mut level) = (0.0, 0.0);
-            for b in weakest.1..weakest.1 + window {
-                self.row.clear();
-                self.row.extend_from_slice(&profiles.row(e, b)[first + SHIFT..][..width]);
-                level += self.row[middle.clone()].iter().sum::<f32>();
-                remove_line(&mut self.row);
-                structure += (self.row.iter().map(|r| r * r).sum::<f32>() / width as f32).sqrt();
-            }
-            self.structure[e] = structure / window as f32;
             self.level[e] = level / (window * middle.len()) as f32;
         }
     }

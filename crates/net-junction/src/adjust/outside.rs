@@ -17,10 +17,10 @@ const HIDDEN: u32 = 2;
 #[derive(Debug, Default)]
 pub(crate) struct Outside {
     parent: Vec<u32>,
-    /// Missing and hidden twines of a region, and whether it reaches the end of the picture; kept at its root.
+    /// Missing and hidden twines of a region, and its meshes at the end of the picture; kept at its root.
     missing: Vec<u32>,
     hidden: Vec<u32>,
-    open: Vec<bool>,
+    open: Vec<u32>,
     evidence: Vec<Evidence>,
 }
 
@@ -58,7 +58,7 @@ impl Outside {
         // Farther out nothing is told. (Twines out of the picture have no contrast; they would join all of its end.)
         let untold = |t: &Twine| t.state == TwineState::Unknown && t.llr <= 0.0 && t.contrast != 0.0;
         self.join(graph, twines, |t| t.state == TwineState::Missing || untold(t));
-        self.change(graph, twines, TwineState::Unknown, |o, r| o.open[r] && o.missing[r] >= TWINES);
+        self.change(graph, twines, TwineState::Unknown, |o, r| o.missing[r] >= TWINES && o.is_open(r));
         let covered = |t: &Twine| matches!(t.state, TwineState::Missing | TwineState::Hidden | TwineState::Fouled);
         self.join(graph, twines, |t| covered(t) || untold(t));
         self.change(graph, twines, TwineState::Hidden, |o, r| o.hidden[r] >= o.missing[r].max(HIDDEN));
@@ -91,7 +91,7 @@ impl Outside {
         self.open.extend(graph.nodes.iter().map(|node| {
             let (i, j) = node.index;
             let corners = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
-            !corners.into_iter().all(|c| graph.node_at(c).is_some_and(|n| graph.nodes[n].inside))
+            u32::from(!corners.into_iter().all(|c| graph.node_at(c).is_some_and(|n| graph.nodes[n].inside)))
         }));
         for twine in twines.iter().filter(|t| belongs(t)) {
             let [a, b] = beside(graph, twine).map(|cell| cell.map(|c| self.root(c)));
@@ -103,10 +103,10 @@ impl Outside {
                     self.parent[b] = a as u32;
                     self.missing[a] += self.missing[b];
                     self.hidden[a] += self.hidden[b];
-                    self.open[a] |= self.open[b];
+                    self.open[a] += self.open[b];
                 }
                 [Some(_), Some(_)] => (),
-                _ => self.open[root] = true,
+                _ => self.open[root] += 1,
             }
         }
     }
@@ -126,6 +126,12 @@ impl Outside {
                 twine.state = state;
             }
         }
+    }
+
+    /// Whether a region goes on beyond the picture. What a straight end of the net cuts off, a corner at the least, lies along the picture's end with twice the root of
+    /// its twines or more, half of a round hole with 1.1 times.
+    fn is_open(&self, root: usize) -> bool {
+        self.open[root].saturating_pow(2) > self.missing[root]
     }
 
     fn root(&mut self, cell: usize) -> usize {
