@@ -3,7 +3,7 @@
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
 use crate::numeric::median;
-use crate::refine::fine_score;
+use crate::score::score;
 use crate::search::{Candidate, NOTHING, Scope, Search};
 use crate::spectra::Bank;
 
@@ -34,7 +34,7 @@ impl Background {
                 for k in 0..2 {
                     let roll = std::f64::consts::PI * ((golden * 7.0 + 0.5 * f64::from(k)) % 1.0);
                     let rotation = r * Rotation3::new(Vector3::new(0.0, 0.0, roll)).into_inner();
-                    let score = fine_score(
+                    let score = score(
                         bank,
                         scale,
                         scope,

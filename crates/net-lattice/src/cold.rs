@@ -42,6 +42,8 @@ const OUTWARDS: usize = 3;
 const REFINED: usize = 16;
 /// Candidates that are looked through for a second net.
 const MOST: usize = 12;
+/// Side of a cell, px, that the drawing needs to tell where twine is as well as the picture does.
+const DRAWN_CELL_PX: f64 = 20.0;
 /// Turn of the tilts about the one found from which a lock-in is tried again, rad.
 const OTHER: f64 = 0.16;
 /// Tiles whose residuals are alike, small ones and large ones, which are twice as wide: on simulated nets with uneven knots four small ones counted as one
@@ -82,6 +84,7 @@ impl Workspace {
                 polarity,
                 blur,
                 focus: f64::INFINITY,
+                drawn_cell_px: DRAWN_CELL_PX,
             });
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
             if settled.is_none() && coherence > 0.8 && evidence.good > 0.9 {
@@ -155,6 +158,7 @@ impl Workspace {
     /// and no mere ghost beside it, and by how much the next period falls short.
     fn nearer_net(&mut self, best: &Lock, other: Lock) -> Option<(Lock, f64)> {
         let other = self.elsewhere(other);
+        let other = self.nearer_period(other, best.surface.depth)?;
         let (other, margin) = self.true_period(other)?;
         let nearer = other.surface.depth < best.surface.depth && !same_but_for_period(&other.surface, &best.surface);
         (nearer && self.drawn(&other.surface).0 > PART * self.drawn(&best.surface).0).then_some((other, margin))

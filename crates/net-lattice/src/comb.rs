@@ -4,13 +4,15 @@
 //! `z_h` of one family in one tile, demodulated at h times the predicted phase, peak together where the lattice is off by `e` cells:
 //! `C(e) = sum_h w_h Re(z_h exp(-2 pi j h e))`, the matched filter for a comb in coloured noise.
 
-use crate::lockin::TileSum;
-use crate::numeric::{median, sin_cos_cycles};
+use crate::demodulate::TileSum;
+use crate::numeric::median;
 
 /// Harmonics that are summed.
 pub(crate) const HARMONICS: usize = 4;
 /// Steps of a cell in which the peak is looked for.
 const STEPS: usize = 24;
+/// Cosines and sines of each harmonic at those steps, which begin half a cell before the line.
+const WAVES: [[[f64; STEPS]; 2]; HARMONICS] = waves();
 /// Highest frequency, cycles per px of the level, at which a harmonic is measured.
 const HIGHEST: f64 = 0.42;
 /// Blur of an ordinary picture, px of the level, one standard deviation.
@@ -27,6 +29,29 @@ pub(crate) const LOOKS: [f64; 3] = [1.0, -1.0, 0.0];
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Comb {
     weight: [[f64; HARMONICS]; 2],
+}
+
+/// All of them are steps round one circle.
+const fn waves() -> [[[f64; STEPS]; 2]; HARMONICS] {
+    // Cosine and sine of 15 degrees.
+    const STEP: [f64; 2] = [0.965_925_826_289_068_3, 0.258_819_045_102_520_76];
+    let (mut circle, mut k) = ([[1.0, 0.0]; STEPS], 1);
+    while k < STEPS {
+        let [c, s] = circle[k - 1];
+        circle[k] = [c * STEP[0] - s * STEP[1], s * STEP[0] + c * STEP[1]];
+        k += 1;
+    }
+    let (mut waves, mut h) = ([[[0.0; STEPS]; 2]; HARMONICS], 0);
+    while h < HARMONICS {
+        k = 0;
+        while k < STEPS {
+            let [c, s] = circle[(h + 1) * (k + STEPS / 2) % STEPS];
+            (waves[h][0][k], waves[h][1][k]) = (c, s);
+            k += 1;
+        }
+        h += 1;
+    }
+    waves
 }
 
 impl Comb {
@@ -71,29 +96,22 @@ impl Comb {
     pub(crate) fn peak(&self, f: usize, sum: &TileSum, k: f64) -> (f64, f64) {
         let resolved = ((HIGHEST / k) as usize).clamp(1, HARMONICS);
         let (weight, z) = (&self.weight[f][..resolved], &sum.z[f]);
-        let height = |e: f32| {
-            let (s1, c1) = sin_cos_cycles(e);
-            let (mut s, mut c) = (s1, c1);
-            let mut sum = 0.0;
-            for (w, z) in weight.iter().zip(z) {
-                sum += w * (z[0] * f64::from(c) + z[1] * f64::from(s));
-                (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
-            }
-            sum
-        };
-        let step = 1.0 / STEPS as f32;
-        let mut best = (f64::NEG_INFINITY, 0);
-        for k in 0..STEPS {
-            let h = height(k as f32 * step - 0.5);
-            if h > best.0 {
-                best = (h, k);
+        let mut heights = [0.0; STEPS];
+        for ((w, z), [cosines, sines]) in weight.iter().zip(z).zip(&WAVES) {
+            for (height, (c, s)) in heights.iter_mut().zip(cosines.iter().zip(sines)) {
+                *height += w * (z[0] * c + z[1] * s);
             }
         }
-        let middle = best.1 as f32 * step - 0.5;
-        let (a, b, c) = (height(middle - step), best.0, height(middle + step));
+        let mut best = 0;
+        for (k, height) in heights.iter().enumerate() {
+            if *height > heights[best] {
+                best = k;
+            }
+        }
+        let (a, b, c) = (heights[(best + STEPS - 1) % STEPS], heights[best], heights[(best + 1) % STEPS]);
         let bend = a - 2.0 * b + c;
         let part = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-        let mut off = f64::from(middle) + part * f64::from(step);
+        let mut off = (best as f64 + part) / STEPS as f64 - 0.5;
         off -= (off + 0.5).floor();
         let whole: f64 = weight.iter().map(|w| w * w).sum();
         let top = (b - 0.25 * (a - c) * part).max(0.0);

@@ -5,8 +5,14 @@
 //! pixels wide show only a few phases, and bins that stay empty would look like cells that differ. Six are two by three: a lattice of
 //! which only every second, third or fourth line exists shows in waves longer than a cell.
 
+use std::sync::Arc;
+
+use realfft::{RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex64;
+use rustfft::{Fft, FftPlanner};
+
 use crate::lockin::Measurement;
-use crate::map::PhaseMap;
+use crate::map::{PhaseMap, Plane};
 use crate::numeric::wrap;
 use crate::view::{BLOCK, Level, TileGrid};
 
@@ -33,15 +39,39 @@ pub(crate) struct Fold {
     pub snr: f64,
 }
 
-/// Sums over two halves of the picture, kept between pictures.
-#[derive(Debug, Default)]
+/// Sums over two halves of the picture, kept between pictures, and the transform of them.
 pub(crate) struct Folder {
     /// Two halves, the second coordinate runs fastest: brightness and number of pixels.
-    sums: Vec<[f64; 2]>,
-    /// cos and sin of a turn in `WIDE` steps.
-    wave: Vec<[f64; 2]>,
-    /// Transform along the second coordinate: half, bin of the first, order.
-    rows: Vec<[f64; 2]>,
+    sums: Vec<[f32; 2]>,
+    second: Arc<dyn RealToComplex<f64>>,
+    first: Arc<dyn Fft<f64>>,
+    line: Vec<f64>,
+    half: Vec<Complex64>,
+    scratch: Vec<Complex64>,
+    /// Coefficients: half, order along the second coordinate, along the first.
+    waves: Vec<Complex64>,
+}
+
+impl Default for Folder {
+    fn default() -> Self {
+        let second = RealFftPlanner::new().plan_fft_forward(WIDE);
+        let first = FftPlanner::new().plan_fft_forward(WIDE);
+        Self {
+            sums: Vec::new(),
+            line: vec![0.0; WIDE],
+            half: second.make_output_vec(),
+            scratch: vec![Complex64::default(); second.get_scratch_len().max(first.get_inplace_scratch_len())],
+            waves: vec![Complex64::default(); 2 * (ORDERS + 1) * WIDE],
+            second,
+            first,
+        }
+    }
+}
+
+impl std::fmt::Debug for Folder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Folder")
+    }
 }
 
 impl Folder {
@@ -61,11 +91,6 @@ impl Folder {
         self.sums.clear();
         self.sums.resize(2 * WIDE * WIDE, [0.0; 2]);
         let (bx, by) = level.blocks();
-        const PER_CELL: f32 = (WIDE / CELLS) as f32;
-        // Shifted by a whole fold above zero, where truncation is the floor.
-        let bin = |s: f32| (s * PER_CELL + (2 * WIDE) as f32) as u32 as usize % WIDE;
-        let near = |s: f32| wrap(s / CELLS as f32) * CELLS as f32;
-        let mut total = [[0.0; 2]; 2];
         for y in 0..by {
             let tiles = &measurements[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
             for x in 0..bx {
@@ -73,68 +98,56 @@ impl Folder {
                     continue;
                 }
                 let Some([p, q]) = map.block(x, y) else { continue };
-                let (p0, q0) = (near(p.s), near(q.s));
-                let half = coin(x, y);
-                let sums = &mut self.sums[half * WIDE * WIDE..][..WIDE * WIDE];
+                let (p, q) = (bins(&p), bins(&q));
+                let sums = &mut self.sums[coin(x, y) * WIDE * WIDE..][..WIDE * WIDE];
                 for r in 0..BLOCK {
                     let row = &level.thin.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
-                    let v = r as f32 - 1.5;
                     for (c, i) in row.iter().enumerate() {
-                        let u = c as f32 - 1.5;
-                        let k = bin(p0 + p.du * u + p.dv * v) * WIDE + bin(q0 + q.du * u + q.dv * v);
-                        let value = f64::from((i * gain).clamp(-1.0, 1.0));
-                        sums[k][0] += value;
-                        sums[k][1] += 1.0;
-                        total[half][0] += value;
-                        total[half][1] += 1.0;
+                        let k = r * BLOCK + c;
+                        let sum = &mut sums[p[k] as usize * WIDE + q[k] as usize];
+                        sum[0] += (i * gain).clamp(-1.0, 1.0);
+                        sum[1] += 1.0;
                     }
                 }
+            }
+        }
+        let mut total = [[0.0; 2]; 2];
+        for (total, sums) in total.iter_mut().zip(self.sums.chunks_exact(WIDE * WIDE)) {
+            for sum in sums {
+                total[0] += f64::from(sum[0]);
+                total[1] += f64::from(sum[1]);
             }
         }
         if total[0][1] == 0.0 || total[1][1] == 0.0 {
             return Fold::default();
         }
-        self.along_second(total);
+        self.transform(total);
         self.summary(((0.5 * CELLS as f64 * cell).ceil() as usize).saturating_sub(1).clamp(CELLS, ORDERS))
     }
 
-    /// Fourier sums along the second coordinate, orders 0 and up, of brightness less its mean, per pixel.
-    fn along_second(&mut self, total: [[f64; 2]; 2]) {
-        let wave = |k: usize| {
-            let (s, c) = (std::f64::consts::TAU * k as f64 / WIDE as f64).sin_cos();
-            [c, s]
-        };
-        if self.wave.is_empty() {
-            self.wave.extend((0..WIDE).map(wave));
-        }
-        self.rows.clear();
-        for (half, [sum, count]) in total.into_iter().enumerate() {
+    /// Fourier sums of brightness less its mean, per pixel.
+    fn transform(&mut self, total: [[f64; 2]; 2]) {
+        let halves = self.sums.chunks_exact(WIDE * WIDE).zip(self.waves.chunks_exact_mut((ORDERS + 1) * WIDE));
+        for ((sums, waves), [sum, count]) in halves.zip(total) {
             let mean = sum / count;
-            for line in self.sums[half * WIDE * WIDE..][..WIDE * WIDE].chunks_exact(WIDE) {
-                for order in 0..=ORDERS {
-                    let mut z = [0.0; 2];
-                    for (k, [s, n]) in line.iter().enumerate() {
-                        let w = self.wave[k * order % WIDE];
-                        let value = (s - mean * n) / count;
-                        z[0] += value * w[0];
-                        z[1] -= value * w[1];
-                    }
-                    self.rows.push(z);
+            for (bin, line) in sums.chunks_exact(WIDE).enumerate() {
+                for (out, [s, n]) in self.line.iter_mut().zip(line) {
+                    *out = (f64::from(*s) - mean * f64::from(*n)) / count;
+                }
+                // The lengths come from the plan itself, so this cannot fail.
+                let done = self.second.process_with_scratch(&mut self.line, &mut self.half, &mut self.scratch);
+                debug_assert!(done.is_ok());
+                for (waves, z) in waves.chunks_exact_mut(WIDE).zip(&self.half) {
+                    waves[bin] = *z;
                 }
             }
+            waves.chunks_exact_mut(WIDE).for_each(|w| self.first.process_with_scratch(w, &mut self.scratch));
         }
     }
 
     /// Coefficient of a wave: order along the first coordinate (any sign), along the second (0 and up).
-    fn coefficient(&self, half: usize, first: isize, second: usize) -> [f64; 2] {
-        let mut z = [0.0; 2];
-        for k in 0..WIDE {
-            let r = self.rows[(half * WIDE + k) * (ORDERS + 1) + second];
-            let w = self.wave[(k as isize * first).rem_euclid(WIDE as isize) as usize];
-            z[0] += r[0] * w[0] + r[1] * w[1];
-            z[1] += r[1] * w[0] - r[0] * w[1];
-        }
-        z
+    fn coefficient(&self, half: usize, first: isize, second: usize) -> Complex64 {
+        self.waves[(half * (ORDERS + 1) + second) * WIDE + first.rem_euclid(WIDE as isize) as usize]
     }
 
     /// From all orders up to `highest`.
@@ -144,7 +157,7 @@ impl Folder {
             let least = if second == 0 { 1 } else { -(highest as isize) };
             for first in least..=highest as isize {
                 let (a, b) = (self.coefficient(0, first, second), self.coefficient(1, first, second));
-                let common = a[0] * b[0] + a[1] * b[1];
+                let common = a.re * b.re + a.im * b.im;
                 // Steps of two or three along both: periods of three or two cells.
                 let coarse = |step: usize| first.unsigned_abs().is_multiple_of(step) && second.is_multiple_of(step);
                 let kind = match (coarse(2), coarse(3)) {
@@ -159,7 +172,7 @@ impl Folder {
                     continue;
                 }
                 repeats += common;
-                noise += 0.25 * ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
+                noise += 0.25 * (a - b).norm_sqr();
                 if second == 0 {
                     along[0] += common;
                 } else if first == 0 {
@@ -184,6 +197,18 @@ impl Folder {
             snr: repeats / noise.max(1e-12),
         }
     }
+}
+
+/// Bins of a block's pixels along one coordinate.
+#[inline]
+fn bins(plane: &Plane) -> [i32; BLOCK * BLOCK] {
+    let mut bins = [0; BLOCK * BLOCK];
+    for (k, bin) in bins.iter_mut().enumerate() {
+        let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
+        let turns = wrap((plane.s + plane.du * u + plane.dv * v) * (1.0 / CELLS as f32)) + 0.5;
+        *bin = ((turns * WIDE as f32) as i32).min(WIDE as i32 - 1);
+    }
+    bins
 }
 
 /// Which half a block belongs to: without a pattern of its own that could beat with the net's.

@@ -9,6 +9,10 @@ use crate::model::Model;
 use crate::seed::Seed;
 use crate::workspace::{Lock, Workspace};
 
+/// Side of a cell, px, that is fine enough to draw where all that is to be found is the rest of a prediction: a fourth of the pixels of a first picture's, each of them of a
+/// fourth of the noise.
+const DRAWN_CELL_PX: f64 = 8.0;
+
 impl Workspace {
     /// The sheet of the last picture, moved as predicted, locked and refined.
     pub(crate) fn follow(&mut self, config: &Config, predicted: &Pose) -> Option<LatticeEstimate> {
@@ -36,6 +40,7 @@ impl Workspace {
             polarity: last.polarity,
             blur: last.blur,
             focus: last.focus,
+            drawn_cell_px: DRAWN_CELL_PX,
         };
         self.conclude(config, &surface, &lock, last.model, last.margin, Some(last.labels))
     }

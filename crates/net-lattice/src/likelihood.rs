@@ -10,21 +10,23 @@ use crate::smooth::Smoother;
 use crate::surface::Surface;
 use crate::template::{Profile, look_up_all};
 use crate::view::{BLOCK, Level, TileGrid};
+use crate::wide::widely;
 
-/// Sum of a function of the blocks' pixels, four sums side by side: what the processor adds at once.
-#[inline]
+/// Sum of a function of the blocks' pixels, eight sums side by side: what the processor adds at once.
+#[inline(always)]
 fn total<const N: usize>(blocks: [&Block; N], f: impl Fn([f32; N]) -> f32) -> f32 {
-    let mut sums = [0.0; 4];
-    for k in (0..PIXELS).step_by(4) {
+    let mut sums = [0.0; 8];
+    for k in (0..PIXELS).step_by(8) {
         for (lane, sum) in sums.iter_mut().enumerate() {
             *sum += f(std::array::from_fn(|n| blocks[n][k + lane]));
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
+    let pair = |k: usize| sums[k] + sums[k + 4];
+    (pair(0) + pair(1)) + (pair(2) + pair(3))
 }
 
 /// Cells from the nearest twine, of a block's pixels.
-#[inline]
+#[inline(always)]
 fn positions(plane: &Plane, offset: f32) -> Block {
     let mut q = [0.0; PIXELS];
     for (k, q) in q.iter_mut().enumerate() {
@@ -161,6 +163,26 @@ impl Likelihood {
 
     /// Draws the net and its derivatives, and removes from it what the high-pass filter removed from the picture.
     fn draw<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) {
+        if SLOPES {
+            draw_with_slopes(self, map, drawing)
+        } else {
+            draw_alone(self, map, drawing)
+        }
+        if drawing.sparse {
+            fill_in(&mut self.mean);
+        }
+        smoother.blur(&self.mean, (drawing.high_pass / BLOCK as f64) as f32, &mut self.smooth);
+        for (b, used) in self.used.iter().enumerate() {
+            if *used {
+                let m = self.smooth.data()[b];
+                self.drawn[b].iter_mut().for_each(|t| *t -= m);
+            }
+        }
+    }
+
+    /// Block by block, and each block's mean.
+    #[inline(always)]
+    fn draw_blocks<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing) {
         let bx = self.blocks_x;
         for y in 0..self.blocks_y {
             for x in 0..bx {
@@ -168,11 +190,11 @@ impl Likelihood {
                 self.used[b] = false;
                 let mean = &mut self.mean.data_mut()[b];
                 *mean = 0.0;
-                let Some(planes) = map.block(x, y) else { continue };
-                self.used[b] = !drawing.sparse || chosen(x, y);
-                if !self.used[b] {
+                if drawing.sparse && !chosen(x, y) {
                     continue;
                 }
+                let Some(planes) = map.block(x, y) else { continue };
+                self.used[b] = true;
                 let rows: [_; 2] = std::array::from_fn(|f| {
                     let p = &planes[f];
                     self.profiles[f].row(drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt())
@@ -195,20 +217,11 @@ impl Likelihood {
                 *mean = total([t], |[t]| t) / PIXELS as f32;
             }
         }
-        if drawing.sparse {
-            fill_in(&mut self.mean);
-        }
-        smoother.blur(&self.mean, (drawing.high_pass / BLOCK as f64) as f32, &mut self.smooth);
-        for (b, used) in self.used.iter().enumerate() {
-            if *used {
-                let m = self.smooth.data()[b];
-                self.drawn[b].iter_mut().for_each(|t| *t -= m);
-            }
-        }
     }
 
-    /// Local contrast of the drawing in the picture, of one sign.
-    fn fit_amplitude(&mut self, drawing: &Drawing, smoother: &mut Smoother) {
+    /// Products of picture and drawing, and of the drawing with itself, block by block.
+    #[inline(always)]
+    fn correlate_blocks(&mut self) {
         for b in 0..self.used.len() {
             let (mut num, mut den) = (0.0f32, 0.0f32);
             if self.used[b] {
@@ -218,6 +231,11 @@ impl Likelihood {
             self.num.data_mut()[b] = num;
             self.den.data_mut()[b] = den;
         }
+    }
+
+    /// Local contrast of the drawing in the picture, of one sign.
+    fn fit_amplitude(&mut self, drawing: &Drawing, smoother: &mut Smoother) {
+        correlate(self);
         let sigma = (drawing.contrast_length / BLOCK as f64) as f32;
         smoother.blur(&self.num, sigma, &mut self.smooth);
         smoother.blur(&self.den, sigma, &mut self.amplitude);
@@ -239,6 +257,13 @@ impl Likelihood {
     ) -> f64 {
         self.draw::<false>(map, drawing, smoother);
         self.fit_amplitude(drawing, smoother);
+        let gain = compare(self, grid, mask);
+        gain * std::f64::consts::LN_2 * if drawing.sparse { 4.0 } else { 1.0 }
+    }
+
+    /// The gain of the blocks drawn, in powers of 2.
+    #[inline(always)]
+    fn compare_blocks(&self, grid: &TileGrid, mask: &[bool]) -> f64 {
         let per = 1.0 / (1.5 * self.noise);
         let mut gain = 0.0f64;
         for b in 0..self.used.len() {
@@ -262,7 +287,7 @@ impl Likelihood {
             }
             gain += f64::from(sum);
         }
-        gain * std::f64::consts::LN_2 * if drawing.sparse { 4.0 } else { 1.0 }
+        gain
     }
 
     /// Where each tile says the lattice is: its predicted coordinates plus the shift that the picture asks for.
@@ -292,6 +317,13 @@ impl Likelihood {
             fill_in(&mut self.num);
         }
         smoother.blur(&self.num, (drawing.contrast_length / BLOCK as f64) as f32, &mut self.variance);
+        sum_tiles(self, grid);
+        self.solve_tiles(surface, grid, out);
+    }
+
+    /// Gradient and information of every tile.
+    #[inline(always)]
+    fn sum_blocks(&mut self, grid: &TileGrid) {
         self.tiles.clear();
         self.tiles.resize(grid.nx * grid.ny, [0.0; 5]);
         for y in 0..self.blocks_y {
@@ -325,7 +357,6 @@ impl Likelihood {
                 }
             }
         }
-        self.solve_tiles(surface, grid, out);
     }
 
     /// No contrast beyond four times the median: a fish's edge is not twine.
@@ -368,5 +399,31 @@ impl Likelihood {
             }
             out.push(o);
         }
+    }
+}
+
+widely! {
+    fn draw_with_slopes<'a>(likelihood: &'a mut Likelihood, map: &'a PhaseMap, drawing: &'a Drawing) -> () {
+        likelihood.draw_blocks::<true>(map, drawing);
+    }
+}
+widely! {
+    fn draw_alone<'a>(likelihood: &'a mut Likelihood, map: &'a PhaseMap, drawing: &'a Drawing) -> () {
+        likelihood.draw_blocks::<false>(map, drawing);
+    }
+}
+widely! {
+    fn correlate<'a>(likelihood: &'a mut Likelihood) -> () {
+        likelihood.correlate_blocks();
+    }
+}
+widely! {
+    fn compare<'a>(likelihood: &'a Likelihood, grid: &'a TileGrid, mask: &'a [bool]) -> f64 {
+        likelihood.compare_blocks(grid, mask)
+    }
+}
+widely! {
+    fn sum_tiles<'a>(likelihood: &'a mut Likelihood, grid: &'a TileGrid) -> () {
+        likelihood.sum_blocks(grid);
     }
 }

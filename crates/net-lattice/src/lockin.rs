@@ -1,23 +1,10 @@
-//! Lock-in: the picture multiplied by the predicted waves and summed over tiles. What phase is left over says where the lattice really is.
+//! Lock-in: what phase is left over of the demodulated picture says where the lattice really is.
 
-use crate::comb::{Comb, HARMONICS};
-use crate::map::{PhaseMap, Plane};
-use crate::numeric::{quantile, sin_cos_cycles};
+use crate::comb::Comb;
+use crate::demodulate::TileSum;
+use crate::numeric::quantile;
 use crate::surface::{Point, Surface};
-use crate::view::{BLOCK, Level, Site, View};
-
-/// Sums over one tile.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct TileSum {
-    /// Demodulated sums of both families by harmonic, real and imaginary.
-    pub z: [[[f64; 2]; HARMONICS]; 2],
-    /// Sum of squares, clipped.
-    pub power: f64,
-    /// The same without clipping.
-    pub whole: f64,
-    /// Pixels.
-    pub count: f64,
-}
+use crate::view::{Site, View};
 
 /// What a tile says about the lattice.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +58,13 @@ impl Window {
     /// Everything.
     pub(crate) const ALL: Self = Self { centre: [0.0; 2], radius: f64::INFINITY };
 
+    /// Whether a place has a weight of a hundredth or more.
+    pub(crate) fn reaches(&self, pixel: [f64; 2]) -> bool {
+        const RADII: f64 = 3.034_854;
+        let (u, v) = (pixel[0] - self.centre[0], pixel[1] - self.centre[1]);
+        u * u + v * v <= (RADII * self.radius).powi(2)
+    }
+
     /// Whether a place is within one radius.
     pub(crate) fn holds(&self, pixel: [f64; 2]) -> bool {
         (pixel[0] - self.centre[0]).hypot(pixel[1] - self.centre[1]) <= self.radius
@@ -81,113 +75,6 @@ impl Window {
         let (u, v) = (pixel[0] - self.centre[0], pixel[1] - self.centre[1]);
         if self.radius.is_finite() { (-(u * u + v * v) / (2.0 * self.radius * self.radius)).exp() } else { 1.0 }
     }
-}
-
-/// Weight below which tiles are not looked at.
-const NEGLIGIBLE: f64 = 0.01;
-
-/// Demodulates `thin` of a level over its tiles, by all harmonics.
-pub(crate) fn demodulate(
-    level: &Level,
-    tiling: usize,
-    map: &PhaseMap,
-    gain: f32,
-    window: &Window,
-    sums: &mut Vec<TileSum>,
-) {
-    let grid = &level.tiles[tiling];
-    sums.clear();
-    sums.resize(grid.nx * grid.ny, TileSum::default());
-    let (bx, by) = level.blocks();
-    for y in 0..by {
-        let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.thin.row(y * BLOCK + r));
-        let first = usize::from(grid.row[y]) * grid.nx;
-        let sites = &grid.sites[first..][..grid.nx];
-        let tiles = &mut sums[first..][..grid.nx];
-        let mut x = 0;
-        while x < bx {
-            let tx = usize::from(grid.column[x]);
-            let looked_at = window.weight(sites[tx].pixel) >= NEGLIGIBLE;
-            let mut run = Run::default();
-            while x < bx && usize::from(grid.column[x]) == tx {
-                if let Some(planes) = looked_at.then(|| map.block(x, y)).flatten() {
-                    let pixels = std::array::from_fn(|r| std::array::from_fn(|c| gain * rows[r][x * BLOCK + c]));
-                    run.add(&pixels, &planes);
-                }
-                x += 1;
-            }
-            run.flush(&mut tiles[tx]);
-        }
-    }
-}
-
-/// Both families' harmonics side by side: first family's 1, 2, ..., second family's.
-const LANES: usize = 2 * HARMONICS;
-type Lanes = [f32; LANES];
-
-/// Sums over the blocks of one tile in one row of blocks.
-#[derive(Default)]
-pub(crate) struct Run {
-    re: Lanes,
-    im: Lanes,
-    power: f32,
-    whole: f32,
-    blocks: u32,
-}
-
-impl Run {
-    pub(crate) fn add(&mut self, pixels: &[[f32; BLOCK]; BLOCK], planes: &[Plane; 2]) {
-        self.whole += pixels.iter().flatten().map(|p| p * p).sum::<f32>();
-        let p = pixels.map(|row| row.map(|i| i.clamp(-1.0, 1.0)));
-        self.power += p.iter().flatten().map(|p| p * p).sum::<f32>();
-        self.blocks += 1;
-        // Sums and differences of the columns right and left of the middle, inner and outer; then the same of the rows.
-        let e = p.map(|r| [r[1] + r[2], r[0] + r[3], r[1] - r[2], r[0] - r[3]]);
-        let of = |f: &dyn Fn(usize) -> f32| -> [f32; 4] { std::array::from_fn(f) };
-        let (even1, even3) = (of(&|k| e[1][k] + e[2][k]), of(&|k| e[0][k] + e[3][k]));
-        let (odd1, odd3) = (of(&|k| e[1][k] - e[2][k]), of(&|k| e[0][k] - e[3][k]));
-        // Half a pixel and one and a half off the middle.
-        let (su1, cu1) = multiples(planes.each_ref().map(|w| 0.5 * w.du));
-        let (sv1, cv1) = multiples(planes.each_ref().map(|w| 0.5 * w.dv));
-        let (s, c) = multiples(planes.each_ref().map(|w| w.s));
-        for l in 0..LANES {
-            let triple = |s: f32, c: f32| (s * (3.0 - 4.0 * s * s), c * (4.0 * c * c - 3.0));
-            let ((su3, cu3), (sv3, cv3)) = (triple(su1[l], cu1[l]), triple(sv1[l], cv1[l]));
-            let even = |m: &[f32; 4]| m[0] * cu1[l] + m[1] * cu3;
-            let odd = |m: &[f32; 4]| m[2] * su1[l] + m[3] * su3;
-            // Rows above the middle carry exp(+j a), those below exp(-j a).
-            let re = even(&even1) * cv1[l] + even(&even3) * cv3 - odd(&odd1) * sv1[l] - odd(&odd3) * sv3;
-            let im = odd(&even1) * cv1[l] + odd(&even3) * cv3 + even(&odd1) * sv1[l] + even(&odd3) * sv3;
-            self.re[l] += re * c[l] + im * s[l];
-            self.im[l] += im * c[l] - re * s[l];
-        }
-    }
-
-    pub(crate) fn flush(&self, tile: &mut TileSum) {
-        for (l, (re, im)) in self.re.iter().zip(&self.im).enumerate() {
-            let z = &mut tile.z[l / HARMONICS][l % HARMONICS];
-            z[0] += f64::from(*re);
-            z[1] += f64::from(*im);
-        }
-        tile.power += f64::from(self.power);
-        tile.whole += f64::from(self.whole);
-        tile.count += f64::from(self.blocks) * (BLOCK * BLOCK) as f64;
-    }
-}
-
-/// Sines and cosines of the multiples of both families' angles, cycles.
-#[inline]
-fn multiples(x: [f32; 2]) -> (Lanes, Lanes) {
-    let (mut sines, mut cosines) = ([0.0; LANES], [0.0; LANES]);
-    for (f, x) in x.into_iter().enumerate() {
-        let (s1, c1) = sin_cos_cycles(x);
-        let (mut s, mut c) = (s1, c1);
-        for l in f * HARMONICS..(f + 1) * HARMONICS {
-            (sines[l], cosines[l]) = (s, c);
-            (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
-        }
-    }
-    (sines, cosines)
 }
 
 /// Quantile of the tiles that counts as the strongest, and as the faintest.

@@ -36,7 +36,7 @@ impl Workspace {
         let mut margin = Some(1.0);
         for _ in 0..CHANGES {
             let before = lock.surface.depth;
-            margin = self.challenge(&mut lock, &mut rivals);
+            margin = self.challenge(&mut lock, &mut rivals, f64::INFINITY);
             if margin.is_none() || lock.surface.depth == before {
                 break;
             }
@@ -49,12 +49,31 @@ impl Workspace {
         margin.map(|margin| (lock, margin))
     }
 
-    /// Puts the best of the rival periods in the place of the lock; returns by how much of its gain the second falls short.
-    fn challenge(&mut self, lock: &mut Lock, rivals: &mut Vec<Rival>) -> Option<f64> {
+    /// The best period by which a lock is nearer than `depth`, if it is the lock's own or better than that; `None` if the net stays where it is.
+    pub(crate) fn nearer_period(&mut self, mut lock: Lock, depth: f64) -> Option<Lock> {
+        if lock.surface.depth < depth {
+            return Some(lock);
+        }
+        let mut rivals = std::mem::take(&mut self.rivals);
+        let judged = self.challenge(&mut lock, &mut rivals, depth);
+        self.rivals = rivals;
+        self.tools.mask.clear();
+        judged?;
+        if lock.surface.depth < depth
+            && let Some(surface) = self.lock_whole(&lock)
+        {
+            lock.surface = surface;
+        }
+        (lock.surface.depth < depth).then_some(lock)
+    }
+
+    /// Puts the best of the rival periods that bring it nearer than `depth` in the place of the lock; returns by how much of its gain the second falls short.
+    fn challenge(&mut self, lock: &mut Lock, rivals: &mut Vec<Rival>, depth: f64) -> Option<f64> {
         let cell = self.short_px(lock.surface.depth);
         let span = 0.95 * (self.view.levels[0].raw.height() * self.view.reduction) as f64 / 3.0;
         let smallest = SMALLEST_CELL * 0.9 * self.view.reduction as f64;
-        let possible = |m: &f64| *m == 1.0 || (cell / m > smallest && cell / m < span);
+        let own = lock.surface.depth;
+        let possible = |m: &f64| *m == 1.0 || (cell / m > smallest && cell / m < span && own * m < depth);
         self.look_where(lock);
         rivals.clear();
         for m in RIVALS.into_iter().filter(possible) {

@@ -1,79 +1,10 @@
-//! Hypotheses of the search scored on the unblurred spectra, refined, joined by their rivals and put in order.
+//! Hypotheses of the search refined on the unblurred spectra, joined by their rivals and put in order.
 
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
-use crate::numeric::log2_rough;
-use crate::search::{Candidate, NOTHING, Scope, gradient};
-use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
-
-/// Whitened power from which a wave's vote grows with the logarithm only.
-const SOFT: f32 = 4.0;
-
-/// Score of one hypothesis on the unblurred spectra.
-pub(crate) fn fine_score(bank: &Bank, scale: f64, scope: &Scope, c: &Candidate) -> f64 {
-    let d = 0.5 * (std::f64::consts::FRAC_PI_2 - c.angle);
-    let (sd, cd) = d.sin_cos();
-    let det = cd * cd - sd * sd;
-    let sides = scope.sides;
-    let dual = [[cd / det / sides[0], -sd / det / sides[0]], [-sd / det / sides[1], cd / det / sides[1]]];
-    let mut sum = [[0.0f64; 6]; 2];
-    let mut count = [[0.0f64; 6]; 2];
-    let n = SIZE as f64;
-    for (t, site) in bank.sites.iter().enumerate() {
-        let Some(g) = gradient(&c.rotation, site) else { continue };
-        let power = bank.tile(t);
-        for f in 0..2 {
-            let k = |i: usize| (dual[f][0] * g[0][i] + dual[f][1] * g[1][i]) * c.depth * scale;
-            let (mut x, mut y) = (k(0), k(1));
-            if x < 0.0 {
-                (x, y) = (-x, -y);
-            }
-            let len = (x * x + y * y).sqrt();
-            if len * (bank.length as f64) < 0.4 {
-                continue;
-            }
-            for order in 0..6 {
-                let h = (order + 1) as f64;
-                if h * len > HIGHEST {
-                    break;
-                }
-                if h * len * (bank.length as f64) < 2.2 {
-                    continue;
-                }
-                let (px, py) = (h * x * n, h * y * n + n / 2.0);
-                let (ix, iy) = (px as usize, py as usize);
-                if ix + 1 >= COLUMNS || iy + 1 >= SIZE {
-                    continue;
-                }
-                let (fx, fy) = ((px - ix as f64) as f32, (py - iy as f64) as f32);
-                let a = &power[ix * SIZE + iy..][..2];
-                let b = &power[(ix + 1) * SIZE + iy..][..2];
-                let p = (1.0 - fx) * (a[0] + fy * (a[1] - a[0])) + fx * (b[0] + fy * (b[1] - b[0]));
-                // Clipped softly: a plateau would hide where strong waves are highest.
-                sum[f][order] += f64::from(SOFT * log2_rough(1.0 + p / SOFT)) - 1.1;
-                count[f][order] += 1.0;
-            }
-        }
-    }
-    // Blur leaves the lowest harmonics only: as many are counted as do the hypothesis good.
-    let family = |f: usize| {
-        let (mut s, mut n, mut best) = (0.0, 0.0, f64::from(NOTHING));
-        for (sum, count) in sum[f].iter().zip(&count[f]) {
-            s += sum;
-            n += count;
-            if n >= 4.0 {
-                best = f64::max(best, s / n.sqrt());
-            }
-        }
-        best
-    };
-    let (a, b) = (family(0), family(1));
-    if a.min(b) <= f64::from(NOTHING) {
-        return f64::from(NOTHING);
-    }
-    let prior = if scope.angle_sigma > 0.0 { (c.angle - scope.angle) / (1.2 * scope.angle_sigma) } else { 0.0 };
-    0.5 * a.min(b) + 0.25 * (a + b) - 0.5 * prior * prior
-}
+use crate::score::score;
+use crate::search::{Candidate, Scope};
+use crate::spectra::Bank;
 
 /// Rounds of a refinement that tell good candidates from others, and those that are worth it only for the good.
 pub(crate) const ROUGHLY: std::ops::Range<i32> = 0..2;
@@ -88,7 +19,7 @@ pub(crate) fn refine(
     rounds: std::ops::Range<i32>,
 ) -> Candidate {
     let mut best = *start;
-    best.score = fine_score(bank, scale, scope, &best);
+    best.score = score(bank, scale, scope, &best);
     for round in rounds {
         let step = [0.06, 0.06, 0.03, 0.03, 0.07].map(|s| s * 0.6f64.powi(round));
         for p in 0..5 {
@@ -96,6 +27,7 @@ pub(crate) fn refine(
                 continue;
             }
             for sign in [1.0, -1.0] {
+                let before = best.score;
                 for _ in 0..20 {
                     let mut next = best;
                     let s = sign * step[p];
@@ -111,12 +43,16 @@ pub(crate) fn refine(
                     if next.rotation[(2, 2)] < 0.2 || !(0.3..=2.84).contains(&next.angle) {
                         break;
                     }
-                    next.score = fine_score(bank, scale, scope, &next);
+                    next.score = score(bank, scale, scope, &next);
                     if next.score > best.score + 1e-9 {
                         best = next;
                     } else {
                         break;
                     }
+                }
+                // The other way it has come from.
+                if best.score > before {
+                    break;
                 }
             }
         }

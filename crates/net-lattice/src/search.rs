@@ -8,6 +8,7 @@ use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE, VARIANCE};
 use crate::view::View;
+use crate::wide::widely;
 
 /// Directions of dual vectors: every 5 degrees of the half circle.
 const DIRECTIONS: usize = 36;
@@ -59,8 +60,6 @@ pub(crate) struct Search {
     steps: usize,
     /// Steps that are hypotheses' fundamentals.
     depths: std::ops::Range<usize>,
-    /// Tiles of the bank that are looked at.
-    tiles: Vec<usize>,
     walks: Vec<Walk>,
     power_of_step: Vec<f32>,
     sums: Vec<f32>,
@@ -87,7 +86,7 @@ fn basis(tilt: f64, azimuth: f64) -> Matrix3<f64> {
 }
 
 /// Gradient of the tangent-plane coordinates by the pixel, per metre of depth: rows X and Y, columns u and v. `None` near grazing.
-pub(crate) fn gradient(r: &Matrix3<f64>, site: &crate::view::Site) -> Option<[[f64; 2]; 2]> {
+fn gradient(r: &Matrix3<f64>, site: &crate::view::Site) -> Option<[[f64; 2]; 2]> {
     let d = Vector3::new(site.ray[0], site.ray[1], 1.0);
     let n = r.column(2);
     let nd = n.dot(&d);
@@ -120,11 +119,8 @@ impl Search {
         let base = view.focal / largest;
         let last = (12.0 * (largest / smallest).log2()).ceil() as usize + 1;
         let steps = last + HARMONICS[5] + 1;
-        // Many tiles overlap: every second one is enough to rank hypotheses.
-        let stride = if bank.sites.len() > 20 { 2 } else { 1 };
-        let tiles: Vec<usize> = (0..bank.sites.len()).step_by(stride).collect();
-        let mut walks = Vec::with_capacity(tiles.len() * normals.len() * DIRECTIONS);
-        for site in tiles.iter().map(|t| &bank.sites[*t]) {
+        let mut walks = Vec::with_capacity(bank.searched().count() * normals.len() * DIRECTIONS);
+        for site in bank.searched() {
             for r in &normals {
                 let g = gradient(r, site);
                 for k in 0..DIRECTIONS {
@@ -166,7 +162,6 @@ impl Search {
             scores: vec![0.0; cells * steps],
             ranking: Ranking::default(),
             normals,
-            tiles,
             walks,
             counts,
         }
@@ -179,19 +174,19 @@ impl Search {
     }
 
     /// Scores every (normal, direction, depth) for one family.
+    #[inline(always)]
     fn tabulate(&mut self, bank: &Bank) {
         let cells = self.normals.len() * DIRECTIONS;
         let steps = self.steps;
         self.sums.fill(0.0);
-        for (t, walks) in self.tiles.iter().zip(self.walks.chunks_exact(cells)) {
-            let power = bank.coarse_tile(*t);
+        let (tiles, _) = bank.coarse.as_chunks::<{ COLUMNS * SIZE }>();
+        for (power, walks) in tiles.iter().zip(self.walks.chunks_exact(cells)) {
             for (w, sums) in walks.iter().zip(self.sums.chunks_exact_mut(steps)) {
                 let range = usize::from(w.first)..usize::from(w.end);
                 for (sum, p) in sums[range.clone()].iter_mut().zip(&self.power_of_step[range]) {
-                    // Whole numbers of 32 bits are what the processor rounds to in one step.
-                    let ix = (w.x * p + 0.5) as i32;
-                    let iy = (w.y * p + (SIZE / 2) as f32 + 0.5) as i32;
-                    *sum += power[((ix * SIZE as i32 + iy) as usize).min(COLUMNS * SIZE - 1)];
+                    let ix = nearest(w.x * p);
+                    let iy = nearest(w.y * p + (SIZE / 2) as f32);
+                    *sum += power[(ix.wrapping_mul(SIZE as u32).wrapping_add(iy) as usize).min(COLUMNS * SIZE - 1)];
                 }
             }
         }
@@ -215,7 +210,7 @@ impl Search {
 
     /// The best hypotheses, refined, best first.
     pub(crate) fn run(&mut self, bank: &Bank, scope: &Scope, per_octave: usize, found: &mut Vec<Candidate>) {
-        self.tabulate(bank);
+        tabulate(self, bank);
         let steps = self.steps;
         let step_angle = 180.0 / DIRECTIONS as f64;
         let nominal = scope.angle.to_degrees();
@@ -281,6 +276,20 @@ impl Search {
             }
         }
     }
+}
+
+widely! {
+    fn tabulate<'a>(search: &'a mut Search, bank: &'a Bank) -> () {
+        search.tabulate(bank);
+    }
+}
+
+/// The whole number nearest to one from 0 to some thousands, without a library call.
+#[inline(always)]
+fn nearest(x: f32) -> u32 {
+    // 2^23: what is left of a fraction beside it are whole numbers.
+    const MAGIC: f32 = 8_388_608.0;
+    (x + MAGIC).to_bits().wrapping_sub(MAGIC.to_bits())
 }
 
 impl std::fmt::Debug for Search {

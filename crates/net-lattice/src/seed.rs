@@ -26,7 +26,7 @@ impl Workspace {
     /// the optical axis hides no net beside it.
     pub(crate) fn seed(&mut self, surface: &mut Surface) -> Seed {
         surface.offset = [0.0; 2];
-        let place = (self.scale_for(surface.depth).0, 0);
+        let place = (self.coarse_scale_for(surface.depth).0, 0);
         let gain = self.demodulate(surface, place, &Window::ALL);
         self.read_looks(surface, place, gain);
         let mut best = (f64::NEG_INFINITY, Seed { centre: self.view.centre, looks: [0.0; 2] }, [0.0; 2]);
@@ -73,7 +73,7 @@ impl Workspace {
     /// look; `None` if waves of that period are not there at all.
     pub(crate) fn slide(&mut self, surface: &mut Surface) -> Option<Looks> {
         surface.offset = [0.0; 2];
-        let place = (self.scale_for(surface.depth).0, self.tools.tiling);
+        let place = (self.coarse_scale_for(surface.depth).0, self.tools.tiling);
         let gain = self.demodulate(surface, place, &Window::ALL);
         self.read_looks(surface, place, gain);
         let t = &self.tools;

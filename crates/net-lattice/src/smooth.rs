@@ -3,6 +3,7 @@
 use net_image::Image;
 
 use crate::numeric::magnitude_quantiles;
+use crate::wide::widely;
 
 /// Blurs with its buffers kept.
 #[derive(Debug, Default)]
@@ -11,8 +12,6 @@ pub(crate) struct Smoother {
     half: Image<f32>,
     kernel: Vec<f32>,
     line: Vec<f32>,
-    square: Image<f32>,
-    energy: Image<f32>,
 }
 
 impl Smoother {
@@ -21,27 +20,21 @@ impl Smoother {
     /// as it is like a net, not as it is bright (divisive normalisation).
     pub(crate) fn equalize(&mut self, image: &mut Image<f32>, sigma: f32, histogram: &mut Vec<u32>) {
         const FAINT: f64 = 0.3;
-        let (mut square, mut energy) = (std::mem::take(&mut self.square), std::mem::take(&mut self.energy));
-        square.resize(image.width(), image.height());
-        for (s, h) in square.data_mut().iter_mut().zip(image.data()) {
-            *s = h * h;
-        }
-        self.blur(&square, sigma, &mut energy);
-        let [least] = magnitude_quantiles(energy.data().iter().copied(), [FAINT], histogram);
-        for (h, e) in image.data_mut().iter_mut().zip(energy.data()) {
-            *h /= (e + least + 1e-12).sqrt();
-        }
-        (self.square, self.energy) = (square, energy);
+        let f = self.reduce(image, sigma, |p| p * p);
+        let [least] = magnitude_quantiles(self.small.data().iter().copied(), [FAINT], histogram);
+        self.expand(f, image.width(), image.height(), |v, energy| {
+            for (h, e) in image.row_mut(v).iter_mut().zip(energy) {
+                *h /= (e + least + 1e-12).sqrt();
+            }
+        });
     }
 
     /// `out = image - blur(image)`, Gaussian of `sigma` px, edges mirrored.
     pub(crate) fn subtract_blur(&mut self, image: &Image<f32>, sigma: f32, out: &mut Image<f32>) {
         out.resize(image.width(), image.height());
-        let f = self.reduce(image, sigma);
-        self.expand(f, image.width(), image.height(), |v, u0, values| {
-            let src = &image.row(v)[u0..];
-            let dst = &mut out.row_mut(v)[u0..];
-            for ((d, s), b) in dst.iter_mut().zip(src).zip(values) {
+        let f = self.reduce(image, sigma, |p| p);
+        self.expand(f, image.width(), image.height(), |v, smooth| {
+            for ((d, s), b) in out.row_mut(v).iter_mut().zip(image.row(v)).zip(smooth) {
                 *d = s - b;
             }
         });
@@ -50,14 +43,12 @@ impl Smoother {
     /// `out = blur(image)`.
     pub(crate) fn blur(&mut self, image: &Image<f32>, sigma: f32, out: &mut Image<f32>) {
         out.resize(image.width(), image.height());
-        let f = self.reduce(image, sigma);
-        self.expand(f, image.width(), image.height(), |v, u0, values| {
-            out.row_mut(v)[u0..][..values.len()].copy_from_slice(values)
-        });
+        let f = self.reduce(image, sigma, |p| p);
+        self.expand(f, image.width(), image.height(), |v, smooth| out.row_mut(v).copy_from_slice(smooth));
     }
 
-    /// Fills `small` with the blurred picture, a factor smaller, and returns the factor.
-    fn reduce(&mut self, image: &Image<f32>, sigma: f32) -> usize {
+    /// Fills `small` with a blurred function of the picture, a factor smaller, and returns the factor, a power of 2.
+    fn reduce(&mut self, image: &Image<f32>, sigma: f32, of: impl Fn(f32) -> f32) -> usize {
         let (w, h) = (image.width(), image.height());
         let mut f = 1;
         while sigma / (2 * f) as f32 >= 2.0 && w / (2 * f) >= 8 && h / (2 * f) >= 8 {
@@ -66,28 +57,41 @@ impl Smoother {
         let (sw, sh) = (w.div_ceil(f), h.div_ceil(f));
         self.small.resize(sw, sh);
         self.half.resize(sw, sh);
+        self.line.resize(sw * f, 0.0);
         for y in 0..sh {
             let rows = (h - y * f).min(f);
-            self.line.clear();
-            self.line.extend_from_slice(image.row(y * f));
-            for r in 1..rows {
+            self.line.fill(0.0);
+            for r in 0..rows {
                 for (sum, p) in self.line.iter_mut().zip(image.row(y * f + r)) {
-                    *sum += p;
+                    *sum += of(*p);
                 }
             }
-            for (o, block) in self.small.row_mut(y).iter_mut().zip(self.line.chunks(f)) {
-                *o = block.iter().sum::<f32>() / (block.len() * rows) as f32;
+            // Sums of two, of four, ...
+            let mut n = sw * f;
+            while n > sw {
+                n /= 2;
+                for x in 0..n {
+                    self.line[x] = self.line[2 * x] + self.line[2 * x + 1];
+                }
             }
+            let small = self.small.row_mut(y);
+            let per = 1.0 / (f * rows) as f32;
+            for (o, sum) in small.iter_mut().zip(&self.line) {
+                *o = sum * per;
+            }
+            // The last ones may be narrower.
+            small[sw - 1] *= f as f32 / (w - (sw - 1) * f) as f32;
         }
         // The average over f px is itself a blur of (f² - 1) / 12, the interpolation one of about f² / 6.
         let ff = (f * f) as f32;
         let s = if f > 1 { (sigma * sigma - (ff - 1.0) / 12.0 - ff / 6.0).max(0.04) } else { sigma * sigma }.sqrt()
             / f as f32;
-        self.gauss(s);
+        gauss(self, s);
         f
     }
 
     /// Separable Gaussian on `small`, mirrored edges.
+    #[inline(always)]
     fn gauss(&mut self, sigma: f32) {
         let radius = ((3.2 * sigma).ceil() as usize).max(1);
         self.kernel.clear();
@@ -103,7 +107,10 @@ impl Smoother {
         for y in 0..h {
             self.line.clear();
             let row = self.small.row(y);
-            self.line.extend((-(radius as isize)..(w + radius) as isize).map(|i| row[mirror(i, w)]));
+            let (left, right) = (-(radius as isize)..0, w as isize..(w + radius) as isize);
+            self.line.extend(left.map(|i| row[mirror(i, w)]));
+            self.line.extend_from_slice(row);
+            self.line.extend(right.map(|i| row[mirror(i, w)]));
             let out = self.half.row_mut(y);
             for (x, o) in out.iter_mut().enumerate() {
                 *o = self.kernel[0] * self.line[x + radius];
@@ -130,15 +137,15 @@ impl Smoother {
         }
     }
 
-    /// Interpolates `small` bilinearly and hands out each row from column 0.
-    fn expand(&mut self, f: usize, width: usize, height: usize, mut sink: impl FnMut(usize, usize, &[f32])) {
+    /// Interpolates `small` bilinearly and hands out row by row.
+    fn expand(&mut self, f: usize, width: usize, height: usize, mut sink: impl FnMut(usize, &[f32])) {
         if f == 1 {
             for v in 0..height {
-                sink(v, 0, self.small.row(v));
+                sink(v, self.small.row(v));
             }
             return;
         }
-        let (sw, sh) = (self.small.width(), self.small.height());
+        let sh = self.small.height();
         let per = 1.0 / f as f32;
         let offset = 0.5 * per - 0.5;
         self.half.resize(width, 1);
@@ -149,23 +156,47 @@ impl Smoother {
             self.line.clear();
             self.line.extend(a.iter().zip(b).map(|(a, b)| a + fy * (b - a)));
             let out = self.half.row_mut(0);
-            // Half a block at each end is constant; between, every block of f px runs from one sample to the next.
-            let lead = f / 2;
-            out[..lead.min(width)].fill(self.line[0]);
-            let mut u = lead;
-            let mut x = 0;
-            while u < width {
-                let (p, q) = (self.line[x], self.line[(x + 1).min(sw - 1)]);
-                let n = f.min(width - u);
-                let step = (q - p) * per;
-                for (i, o) in out[u..u + n].iter_mut().enumerate() {
-                    *o = p + step * (i as f32 + 0.5);
-                }
-                u += n;
-                x += 1;
+            match f {
+                2 => stretch::<2>(&self.line, out),
+                4 => stretch::<4>(&self.line, out),
+                8 => stretch::<8>(&self.line, out),
+                _ => stretch_by(f, &self.line, out),
             }
-            sink(v, 0, out);
+            sink(v, out);
         }
+    }
+}
+
+widely! {
+    fn gauss<'a>(smoother: &'a mut Smoother, sigma: f32) -> () {
+        smoother.gauss(sigma);
+    }
+}
+
+/// A line stretched by a factor that the compiler knows.
+fn stretch<const F: usize>(line: &[f32], out: &mut [f32]) {
+    stretch_by(F, line, out);
+}
+
+/// A line linearly interpolated to `f` times as many samples. Half a block at each end is constant; between, every block of `f` runs from one sample to the next.
+#[inline(always)]
+fn stretch_by(f: usize, line: &[f32], out: &mut [f32]) {
+    let per = 1.0 / f as f32;
+    let lead = (f / 2).min(out.len());
+    let (head, body) = out.split_at_mut(lead);
+    head.fill(line[0]);
+    let whole = body.len() / f * f;
+    let (blocks, tail) = body.split_at_mut(whole);
+    for (block, ends) in blocks.chunks_exact_mut(f).zip(line.windows(2)) {
+        let step = (ends[1] - ends[0]) * per;
+        for (i, o) in block.iter_mut().enumerate() {
+            *o = ends[0] + step * (i as f32 + 0.5);
+        }
+    }
+    let x = whole / f;
+    let (p, q) = (line[x.min(line.len() - 1)], line[(x + 1).min(line.len() - 1)]);
+    for (i, o) in tail.iter_mut().enumerate() {
+        *o = p + (q - p) * per * (i as f32 + 0.5);
     }
 }
 

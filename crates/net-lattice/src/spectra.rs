@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use crate::numeric::{clip_level, exp2_rough, log2_rough};
+use crate::score::Places;
 use crate::smooth::Smoother;
 use crate::view::{Site, View};
 
@@ -43,12 +44,16 @@ pub(crate) struct Bank {
     corners: Vec<[usize; 2]>,
     /// Middle of each tile.
     pub sites: Vec<Site>,
+    /// The same side by side.
+    pub places: Vec<Places>,
     /// Standard deviation, full-resolution px, of what is smooth and taken away.
     smooth_px: f64,
     window: Vec<f32>,
     /// Whitened power, expected value 1 without a net: tile, column (fx from 0), row (fy + SIZE / 2).
     pub power: Vec<f32>,
-    /// The same as coarse as the search's grid: blurred by a bin, clipped, the highest of the neighbourhood far from the middle, less its mean.
+    /// Every so many tiles the search looks at one: many that overlap say the same.
+    stride: usize,
+    /// The same of those as coarse as the search's grid: blurred by a bin, clipped, the highest of the neighbourhood far from the middle, less its mean.
     pub coarse: Vec<f32>,
     /// Whether a bin is farther from the middle than [`POOLED`].
     far: Vec<bool>,
@@ -113,7 +118,7 @@ impl Bank {
         let hann: Vec<f32> = (0..length)
             .map(|k| (0.5 - 0.5 * (std::f64::consts::TAU * (k + 1) as f64 / (length + 1) as f64).cos()) as f32)
             .collect();
-        let n = corners.len() * COLUMNS * SIZE;
+        let stride = if corners.len() > 20 { 2 } else { 1 };
         let radius = (0..BX * BY)
             .map(|b| {
                 let (x, y) = ((b / BY * FLOOR) as f64 + 1.5, (b % BY * FLOOR) as f64 + 1.5 - SIZE as f64 / 2.0);
@@ -125,23 +130,21 @@ impl Bank {
             far: (0..COLUMNS * SIZE).map(far).collect(),
             level,
             length,
-            corners,
+            places: Places::new(&sites),
             sites,
             smooth_px,
             window: hann,
-            power: vec![1.0; n],
-            coarse: vec![0.0; n],
+            power: vec![1.0; corners.len() * COLUMNS * SIZE],
+            coarse: vec![0.0; corners.len().div_ceil(stride) * COLUMNS * SIZE],
+            stride,
+            corners,
             radius,
         })
     }
 
-    /// Whitened power of a tile, column by column.
-    pub(crate) fn tile(&self, t: usize) -> &[f32] {
-        &self.power[t * COLUMNS * SIZE..][..COLUMNS * SIZE]
-    }
-    /// Blurred, clipped power less 1 of a tile, column by column.
-    pub(crate) fn coarse_tile(&self, t: usize) -> &[f32] {
-        &self.coarse[t * COLUMNS * SIZE..][..COLUMNS * SIZE]
+    /// Sites of the tiles that the search looks at.
+    pub(crate) fn searched(&self) -> impl Iterator<Item = &Site> {
+        self.sites.iter().step_by(self.stride)
     }
 }
 
@@ -264,9 +267,11 @@ impl Spectra {
                     out[SIZE / 2 - low..=SIZE / 2 + low].fill(1.0);
                 }
             }
-            let coarse = &mut bank.coarse[t * COLUMNS * SIZE..][..COLUMNS * SIZE];
-            blur_clip(out, coarse, &mut self.line);
-            pool(coarse, &bank.far, &mut self.pooled);
+            if t % bank.stride == 0 {
+                let coarse = &mut bank.coarse[t / bank.stride * COLUMNS * SIZE..][..COLUMNS * SIZE];
+                blur_clip(out, coarse, &mut self.line);
+                pool(coarse, &bank.far, &mut self.pooled);
+            }
         }
     }
 

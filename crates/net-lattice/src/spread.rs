@@ -4,8 +4,8 @@
 //! to all of it does not curl.
 
 use crate::comb::Comb;
-use crate::lockin::{Measurement, Run, TileSum};
-use crate::map::Plane;
+use crate::demodulate::{Columns, LANES, Strip, TileSum};
+use crate::lockin::Measurement;
 use crate::numeric::Normal;
 use crate::view::{BLOCK, Level, TileGrid};
 
@@ -177,23 +177,29 @@ fn spacing(grid: &TileGrid) -> [f64; 2] {
 fn demodulate(level: &Level, grid: &TileGrid, tile: usize, gain: f32, local: &[Local; 2]) -> TileSum {
     let (tx, ty) = ((tile % grid.nx) as u16, (tile / grid.nx) as u16);
     let (at, per_px) = (grid.sites[tile].pixel, spacing(grid));
-    let mut run = Run::default();
     let range = |of: &[u16], t: u16| of.partition_point(|c| *c < t)..of.partition_point(|c| *c <= t);
-    for y in range(&grid.row, ty) {
-        let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.thin.row(y * BLOCK + r));
-        for x in range(&grid.column, tx) {
-            let middle = |b: usize| ((b * BLOCK) as f64 + 0.5 * BLOCK as f64) * level.scale - 0.5;
-            let (u, v) = ((middle(x) - at[0]) / per_px[0], (middle(y) - at[1]) / per_px[1]);
-            let planes = local.map(|[c, a, b, uu, uv, vv]| Plane {
-                s: (c + u * (a + uu * u + uv * v) + v * (b + vv * v)) as f32,
-                du: ((a + 2.0 * uu * u + uv * v) / per_px[0] * level.scale) as f32,
-                dv: ((b + uv * u + 2.0 * vv * v) / per_px[1] * level.scale) as f32,
-            });
-            let pixels = std::array::from_fn(|r| std::array::from_fn(|c| gain * rows[r][x * BLOCK + c]));
-            run.add(&pixels, &planes);
-        }
-    }
+    let (rows, columns) = (range(&grid.row, ty), range(&grid.column, tx));
+    let middle = |b: usize| ((b * BLOCK) as f64 + 0.5 * BLOCK as f64) * level.scale - 0.5;
     let mut sum = TileSum::default();
-    run.flush(&mut sum);
+    for first in columns.clone().step_by(LANES) {
+        let lanes = columns.end.min(first + LANES) - first;
+        let mut sums = Columns::default();
+        for y in rows.clone() {
+            let mut strip = Strip::default();
+            let v = (middle(y) - at[1]) / per_px[1];
+            for l in 0..lanes {
+                let u = (middle(first + l) - at[0]) / per_px[0];
+                strip.seen[l] = 1.0;
+                for (f, [c, a, b, uu, uv, vv]) in local.iter().enumerate() {
+                    strip.s[f][l] = (c + u * (a + uu * u + uv * v) + v * (b + vv * v)) as f32;
+                    strip.du[f][l] = ((a + 2.0 * uu * u + uv * v) / per_px[0] * level.scale) as f32;
+                    strip.dv[f][l] = ((b + uv * u + 2.0 * vv * v) / per_px[1] * level.scale) as f32;
+                }
+            }
+            let rows = std::array::from_fn(|r| &level.thin.row(y * BLOCK + r)[first * BLOCK..]);
+            sums.add(&rows, gain, &strip);
+        }
+        (0..lanes).for_each(|l| sums.flush(l, &mut sum));
+    }
     sum
 }

@@ -63,7 +63,7 @@ pub(crate) fn look_up(row: &[[f32; 2]; POSITIONS + 1], q: f32) -> (f32, f32) {
 }
 
 /// The same for many places.
-#[inline]
+#[inline(always)]
 pub(crate) fn look_up_all<const N: usize>(row: &[[f32; 2]; POSITIONS + 1], q: &[f32; N]) -> ([f32; N], [f32; N]) {
     // The steps of the table and what is left of them first, then what stands there, then the line between: the first and the last side by side.
     let (mut step, mut part) = ([0; N], [0.0; N]);

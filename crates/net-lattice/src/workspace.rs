@@ -8,11 +8,12 @@ use crate::background::Background;
 use crate::comb::{Comb, LOOKS, Looks};
 use crate::config::Config;
 use crate::decision::Evidence;
+use crate::demodulate::{Columns, TileSum, demodulate};
 use crate::estimate::Followed;
 use crate::fit::{Fit, Fitter, Observation, Prior, Robust};
 use crate::fold::{Fold, Folder};
 use crate::likelihood::{Drawing, Likelihood, Polarity};
-use crate::lockin::{Measurement, Probe, TileSum, Window, demodulate, measure};
+use crate::lockin::{Measurement, Probe, Window, measure};
 use crate::map::PhaseMap;
 use crate::model::Model;
 use crate::numeric::clip_level;
@@ -28,6 +29,8 @@ use crate::view::View;
 
 /// Weight of a tile in which next to nothing is.
 const WEAK: f64 = 0.05;
+/// Last passes of a lock-in that see all harmonics.
+const FINE: usize = 2;
 /// What counts as near the optical axis, px of an 848 x 480 px picture.
 const NEAR: f64 = 220.0;
 /// Power of a wave over that of noise from which more adds no weight: knots are not where a perfect lattice has them.
@@ -62,6 +65,8 @@ pub(crate) struct Workspace {
 pub(crate) struct Tools {
     pub smoother: Smoother,
     pub map: PhaseMap,
+    /// Sums of a lock-in by column of blocks in one row of tiles, and by tile.
+    pub columns: Vec<Columns>,
     pub sums: Vec<TileSum>,
     pub measurements: Vec<Measurement>,
     /// The same by each look.
@@ -110,6 +115,8 @@ pub(crate) struct Lock {
     pub blur: f64,
     /// Standard deviation of the window about the optical axis in which the sheet is fitted, px of an 848 x 480 px picture.
     pub focus: f64,
+    /// Side of a cell, px, down to which the picture is averaged before it is compared with the drawing.
+    pub drawn_cell_px: f64,
 }
 
 impl Lock {
@@ -204,7 +211,7 @@ impl Workspace {
         (self.view.level_for(self.short_px(depth), 12.0), self.view.tiling_for(self.cell_px(depth)))
     }
 
-    /// The same for a net that is followed: two harmonics are enough to go on.
+    /// The same where three harmonics are enough to go on: on the way, and for a net that is followed.
     pub(crate) fn coarse_scale_for(&self, depth: f64) -> (usize, usize) {
         (self.view.level_for(self.short_px(depth), 8.0), self.view.tiling_for(self.cell_px(depth)))
     }
@@ -215,7 +222,8 @@ impl Workspace {
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
         t.map.fill(surface, level);
-        demodulate(level, place.1, &t.map, gain, window, &mut t.sums);
+        let (columns, sums) = (&mut t.columns, &mut t.sums);
+        demodulate(level, place.1, &t.map, gain, window, columns, sums);
         gain
     }
 
@@ -275,7 +283,9 @@ impl Workspace {
 
     /// Lock-in and fit with a window that grows about `centre`. The measurements left behind are those of the last pass, before its step.
     pub(crate) fn lock(&mut self, start: &Surface, schedule: &[(f64, Model)], seed: Seed) -> Option<Surface> {
-        self.lock_on(self.scale_for(start.depth), start, schedule, seed)
+        let (rough, fine) = schedule.split_at(schedule.len().saturating_sub(FINE));
+        let surface = self.lock_on(self.coarse_scale_for(start.depth), start, rough, seed)?;
+        self.lock_on(self.scale_for(surface.depth), &surface, fine, seed)
     }
 
     /// The same on a level and tiling.
@@ -382,7 +392,7 @@ impl Workspace {
         sparse: bool,
     ) -> Option<(Fit, Robust)> {
         let cell = self.cell_px(surface.depth);
-        let level = self.view.level_for(self.short_px(surface.depth), 20.0);
+        let level = self.view.level_for(self.short_px(surface.depth), lock.drawn_cell_px);
         let tiling = self.view.tiling_for(cell);
         self.high(level, cell);
         self.load_likelihood(level);
