@@ -11,7 +11,7 @@ fn look(study: Study, seed: u64) -> (Option<LatticeEstimate>, Truth) {
     let (camera, mesh) = (scenario.camera().expect("sound"), scenario.mesh().expect("sound"));
     let frame = scenario.frame(0).expect("one frame");
     let mut image = Image::default();
-    let mut simulator = Simulator::new(camera.clone());
+    let mut simulator = Simulator::new(camera);
     let truth = simulator.render(&frame.scene, frame.seed, &mut image).expect("sound").clone();
     let mut estimator = LatticeEstimator::new(&camera, &mesh, &Config::default()).expect("sound");
     let found = estimator.estimate(image.view().expect("not empty")).expect("its size");
