@@ -166,7 +166,7 @@ impl Workspace {
 
     /// What drawing a locked net explains of the picture, and how it is drawn best.
     fn drawn(&mut self, surface: &Surface) -> (f64, Polarity, f64) {
-        let level = self.view.level_for(self.short_px(surface.depth), 12.0);
+        let (level, _) = self.coarse_scale_for(surface.depth);
         let cell = self.cell_px(surface.depth);
         self.gain(surface, level, cell, &Polarity::BOTH, &[1.2])
     }

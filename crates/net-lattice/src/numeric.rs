@@ -1,14 +1,14 @@
 //! Small numeric tools: quick sines and logarithms for pixel loops, the error function, quantiles, a symmetric solver.
 
 /// `x` modulo 1 into [-0.5, 0.5], by adding and taking away 1.5 x 2^23 (rounds to nearest without a library call; |x| < 4 million).
-#[inline]
+#[inline(always)]
 pub(crate) fn wrap(x: f32) -> f32 {
     const MAGIC: f32 = 12_582_912.0;
     x - ((x + MAGIC) - MAGIC)
 }
 
 /// `(sin, cos)` of `x` cycles to 4e-6: Taylor at half the angle, then the double-angle formulas.
-#[inline]
+#[inline(always)]
 pub(crate) fn sin_cos_cycles(x: f32) -> (f32, f32) {
     let a = wrap(x) * std::f32::consts::PI;
     let q = a * a;
@@ -18,7 +18,7 @@ pub(crate) fn sin_cos_cycles(x: f32) -> (f32, f32) {
 }
 
 /// Base-2 logarithm of a positive number to 0.01.
-#[inline]
+#[inline(always)]
 pub(crate) fn log2_rough(x: f32) -> f32 {
     let bits = x.to_bits();
     let exponent = (bits >> 23) as f32 - 127.0;
@@ -27,7 +27,7 @@ pub(crate) fn log2_rough(x: f32) -> f32 {
 }
 
 /// 2 to the power of `x` to 0.3 %, for x in -126..127.
-#[inline]
+#[inline(always)]
 pub(crate) fn exp2_rough(x: f32) -> f32 {
     // Shifted above zero, where truncation is the floor and needs no library call.
     let x = x.clamp(-126.0, 126.0) + 127.0;

@@ -4,6 +4,7 @@ use crate::comb::Looks;
 use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::surface::Surface;
+use crate::view::LEVELS;
 use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
 
 /// Rival depths: scaling depth by m scales every phase by m.
@@ -14,6 +15,8 @@ const FEWEST: usize = 4;
 const IN_STEP: f64 = 3.5;
 /// How often the period may change.
 const CHANGES: usize = 3;
+/// Side of a cell, px, from which drawings of it can be told apart.
+const FINE_PX: f64 = 6.0;
 /// Blurs, px, of which the drawing that tells between rivals takes the best.
 const BLURS: [f64; 3] = [0.76, 1.5, 2.8];
 
@@ -24,6 +27,7 @@ pub(crate) struct Rival {
     scale: f64,
     surface: Surface,
     looks: Looks,
+    /// What its drawing explains, of what the lock's does on the same level.
     gain: f64,
     polarity: Polarity,
 }
@@ -86,14 +90,24 @@ impl Workspace {
             }
             rivals.push(Rival { scale: m, surface, looks, gain: 0.0, polarity: lock.polarity });
         }
-        let (first, last) = (rivals.first()?.scale, rivals.last()?.scale);
-        // All in one comparison: fine enough for the smallest cells, and filtered for the widest.
-        let level = self.view.level_for(cell / last, 6.0);
-        let widest = self.cell_px(lock.surface.depth * first);
-        (_, _, lock.blur) = self.gain(&lock.surface, level, widest, &[lock.polarity], &BLURS);
-        for r in rivals.iter_mut() {
+        let first = rivals.first()?.scale;
+        // Each against the lock, fine enough for the smaller cells of the two, and all filtered for the widest.
+        let level = |m: f64| self.view.level_for(cell / m.max(1.0), FINE_PX);
+        let (levels, own_level) = (RIVALS.map(level), level(1.0));
+        let widest = self.cell_px(own * first);
+        (_, _, lock.blur) = self.gain(&lock.surface, own_level, widest, &[lock.polarity], &BLURS);
+        let mut by_level = [None; LEVELS];
+        for (m, level) in RIVALS.into_iter().zip(levels) {
+            let Some(r) = rivals.iter_mut().find(|r| r.scale == m) else { continue };
+            let unit = match by_level[level] {
+                Some(unit) => unit,
+                None => self.gain(&lock.surface, level, widest, &[lock.polarity], &[lock.blur]).0,
+            };
+            by_level[level] = Some(unit);
             (r.gain, r.polarity, _) = self.gain(&r.surface, level, widest, &Polarity::BOTH, &[lock.blur]);
+            r.gain /= unit.abs().max(1e-9);
         }
+        let unit = by_level[own_level].unwrap_or(0.0).abs();
         rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         // The best and the second of them by worth, which is at most the gain.
         let (mut best, mut second) = ((f64::NEG_INFINITY, 0), f64::NEG_INFINITY);
@@ -115,7 +129,7 @@ impl Workspace {
         let second = if second.is_finite() { second } else { 0.0 };
         lock.seed.looks = r.looks;
         (lock.surface, lock.start) = (r.surface, lock.start.scaled(r.scale));
-        (lock.gain, lock.polarity) = (r.gain, r.polarity);
+        (lock.gain, lock.polarity) = (r.gain * unit, r.polarity);
         Some((gain - second) / gain.abs().max(1e-9))
     }
 

@@ -12,6 +12,7 @@ use crate::numeric::{clip_level, exp2_rough, log2_rough};
 use crate::score::Places;
 use crate::smooth::Smoother;
 use crate::view::{Site, View};
+use crate::wide::widely;
 
 /// Length of the transforms: tiles are shorter and padded with zeros.
 pub(crate) const SIZE: usize = 256;
@@ -188,7 +189,7 @@ impl Spectra {
         for t in 0..tiles {
             self.transform(bank, t, floor);
         }
-        self.whiten(bank);
+        whiten(self, bank);
     }
 
     /// Logarithm of the power of tile `t`, and of the `floor` added to it.
@@ -222,13 +223,14 @@ impl Spectra {
             self.columns.process_with_scratch(column, &mut self.scratch_columns);
             // Rows from fy = -1/2 on.
             let (positive, negative) = column.split_at(SIZE / 2);
-            for (o, c) in out.iter_mut().zip(negative.iter().chain(positive)) {
-                *o = log2_rough(c.norm_sqr() + floor);
-            }
+            let (first, last) = out.split_at_mut(SIZE / 2);
+            logarithms(negative, floor, first);
+            logarithms(positive, floor, last);
         }
     }
 
     /// Divides by the local noise floor: first the mean over directions and tiles, then the neighbourhood of each bin.
+    #[inline(always)]
     fn whiten(&mut self, bank: &mut Bank) {
         let tiles = bank.corners.len();
         let classes = bank.radius.iter().max().map_or(1, |r| usize::from(*r) + 1);
@@ -258,10 +260,9 @@ impl Spectra {
             for x in 0..COLUMNS {
                 let floor = &self.floor2[x / FLOOR * BY..][..BY];
                 let (log, out) = (&log[x * SIZE..][..SIZE], &mut out[x * SIZE..][..SIZE]);
-                for ((log, out), f) in log.chunks_exact(FLOOR).zip(out.chunks_exact_mut(FLOOR)).zip(floor) {
-                    for (l, o) in log.iter().zip(out) {
-                        *o = exp2_rough(l - f - BIAS);
-                    }
+                spread(floor, BIAS, &mut self.line);
+                for ((l, o), f) in log.iter().zip(out.iter_mut()).zip(&self.line) {
+                    *o = exp2_rough(l - f);
                 }
                 if x <= low {
                     out[SIZE / 2 - low..=SIZE / 2 + low].fill(1.0);
@@ -276,18 +277,22 @@ impl Spectra {
     }
 
     /// Mean logarithm in blocks of bins; with `above`, bins are clipped that much above `floor2`.
+    #[inline(always)]
     fn block_means(&mut self, t: usize, above: Option<f32>) {
         let log = &self.log[t * COLUMNS * SIZE..][..COLUMNS * SIZE];
-        for bx in 0..BX {
-            for by in 0..BY {
-                let limit = above.map_or(f32::INFINITY, |a| self.floor2[bx * BY + by] + a);
-                let mut sum = 0.0;
-                for x in 0..FLOOR {
-                    for l in &log[(bx * FLOOR + x) * SIZE + by * FLOOR..][..FLOOR] {
-                        sum += l.min(limit);
-                    }
+        let (mut sums, mut limits) = ([0.0f32; SIZE], [f32::INFINITY; SIZE]);
+        for (bx, columns) in log.chunks_exact(FLOOR * SIZE).enumerate() {
+            if let Some(above) = above {
+                spread(&self.floor2[bx * BY..][..BY], above, &mut limits);
+            }
+            sums.fill(0.0);
+            for column in columns.chunks_exact(SIZE) {
+                for ((sum, l), limit) in sums.iter_mut().zip(column).zip(&limits) {
+                    *sum += if l < limit { *l } else { *limit };
                 }
-                self.floor[bx * BY + by] = sum / (FLOOR * FLOOR) as f32;
+            }
+            for (floor, sums) in self.floor[bx * BY..][..BY].iter_mut().zip(sums.chunks_exact(FLOOR)) {
+                *floor = sums.iter().sum::<f32>() / (FLOOR * FLOOR) as f32;
             }
         }
     }
@@ -320,7 +325,30 @@ impl Spectra {
     }
 }
 
+widely! {
+    fn logarithms<'a>(values: &'a [Complex32], floor: f32, out: &'a mut [f32]) -> () {
+        for (o, c) in out.iter_mut().zip(values) {
+            *o = log2_rough(c.norm_sqr() + floor);
+        }
+    }
+}
+
+widely! {
+    fn whiten<'a>(spectra: &'a mut Spectra, bank: &'a mut Bank) -> () {
+        spectra.whiten(bank);
+    }
+}
+
+/// A number for each bin from one for each block of them, and something added.
+#[inline(always)]
+fn spread(blocks: &[f32], add: f32, bins: &mut [f32]) {
+    for (bins, block) in bins.chunks_exact_mut(FLOOR).zip(blocks) {
+        bins.fill(block + add);
+    }
+}
+
 /// 3 x 3 binomial blur (about a bin), clipped, less 1.
+#[inline(always)]
 fn blur_clip(power: &[f32], out: &mut [f32], line: &mut [f32]) {
     for x in 0..COLUMNS {
         let mid = &power[x * SIZE..][..SIZE];
@@ -339,6 +367,7 @@ fn blur_clip(power: &[f32], out: &mut [f32], line: &mut [f32]) {
 }
 
 /// Puts the highest of the neighbourhood in place of bins far from the middle, less what that is on average, with the same variance.
+#[inline(always)]
 fn pool(coarse: &mut [f32], far: &[bool], pooled: &mut Vec<f32>) {
     highest(coarse, pooled);
     let (mut n, mut sum, mut square) = (0.0f64, 0.0f64, 0.0f64);
@@ -355,21 +384,30 @@ fn pool(coarse: &mut [f32], far: &[bool], pooled: &mut Vec<f32>) {
 }
 
 /// The highest of 3 x 3 bins.
+#[inline(always)]
 fn highest(from: &[f32], to: &mut Vec<f32>) {
     to.clear();
     to.resize(from.len(), 0.0);
     for x in 0..COLUMNS {
         let column = |x: usize| &from[x * SIZE..][..SIZE];
         let (a, b, c) = (column(if x == 0 { 1 } else { x - 1 }), column(x), column((x + 1).min(COLUMNS - 1)));
-        let across = |y: usize| a[y].max(b[y]).max(c[y]);
         let out = &mut to[x * SIZE..][..SIZE];
-        let (mut before, mut here) = (across(0), across(0));
-        for y in 0..SIZE {
-            let after = across((y + 1).min(SIZE - 1));
-            out[y] = before.max(here).max(after);
-            (before, here) = (here, after);
+        let mut across = [0.0f32; SIZE];
+        for (((m, a), b), c) in across.iter_mut().zip(a).zip(b).zip(c) {
+            *m = larger(larger(*a, *b), *c);
         }
+        for y in 1..SIZE - 1 {
+            out[y] = larger(larger(across[y - 1], across[y]), across[y + 1]);
+        }
+        out[0] = larger(across[0], across[1]);
+        out[SIZE - 1] = larger(across[SIZE - 2], across[SIZE - 1]);
     }
+}
+
+/// The larger of two numbers, in one instruction: neither is NaN.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 impl std::fmt::Debug for Spectra {

@@ -9,6 +9,9 @@ use crate::smooth::Smoother;
 /// Pixels along a side of the blocks within which lattice coordinates are linear.
 pub(crate) const BLOCK: usize = 4;
 
+/// Most levels of the pyramid.
+pub(crate) const LEVELS: usize = 4;
+
 /// A place in the picture with the ray through it and through the places one pixel right and below.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Site {
@@ -123,7 +126,7 @@ impl View {
             if det > 0.0 && det.is_finite() { 1.0 / det.sqrt() } else { (camera.fx() * camera.fy()).sqrt() }
         };
         let mut levels = Vec::new();
-        for l in 0..4 {
+        for l in 0..LEVELS {
             let scale = (reduction << l) as f64;
             let (lw, lh) = ((w / reduction) >> l, (h / reduction) >> l);
             let (bx, by) = (lw / BLOCK, lh / BLOCK);

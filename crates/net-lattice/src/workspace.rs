@@ -25,7 +25,7 @@ use crate::spectra::{Bank, Spectra};
 use crate::spread::Spread;
 use crate::stages::Stages;
 use crate::surface::{self, Surface};
-use crate::view::View;
+use crate::view::{LEVELS, View};
 
 /// Weight of a tile in which next to nothing is.
 const WEAK: f64 = 0.05;
@@ -83,19 +83,19 @@ pub(crate) struct Tools {
     pub mask: Vec<bool>,
     pub tiling: usize,
     /// Length of the filter of each level's `high`; zero for none yet.
-    pub high: [f64; 4],
+    pub high: [f64; LEVELS],
     /// The level whose `high` the likelihood has.
     pub loaded: Option<usize>,
     /// The same of `thin`, and the gain of the lock-in.
-    pub thin: [(f64, f32); 4],
+    pub thin: [(f64, f32); LEVELS],
 }
 
 impl Tools {
     /// Another picture: nothing is filtered yet.
     pub(crate) fn forget(&mut self) {
-        self.high = [0.0; 4];
+        self.high = [0.0; LEVELS];
         self.loaded = None;
-        self.thin = [(0.0, 0.0); 4];
+        self.thin = [(0.0, 0.0); LEVELS];
     }
 }
 
