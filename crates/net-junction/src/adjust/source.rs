@@ -16,9 +16,8 @@ const ONE: f32 = 65536.0;
 /// of each leaves out too many pixels where light is low.
 const SAMPLES_MIN: f32 = 2.0;
 const SAMPLES_MAX: f32 = 16.0;
-/// Profiles are sampled in whole vectors of so many values, and in pieces of at most so many.
+/// Profiles are sampled in whole vectors of so many values.
 const LANES: usize = 8;
-const LINE: usize = 32;
 
 /// A picture, ready for bilinear samples, and the same at half and a quarter of its size.
 #[derive(Debug, Default)]
@@ -143,24 +142,35 @@ impl Level {
     /// Adds the picture's values at places in 65536ths of a pixel. Bilinear, in whole numbers.
     #[inline(always)]
     fn add_places(&self, place: impl Fn(i32) -> [i32; 2], out: &mut [i32]) {
+        let (whole, rest) = out.as_chunks_mut();
+        let end = (whole.len() * LANES) as i32;
+        for (first, out) in (0..).step_by(LANES).zip(whole) {
+            self.add_vector(&place, first, out);
+        }
+        if !rest.is_empty() {
+            let mut last = [0; LANES];
+            self.add_vector(&place, end, &mut last);
+            rest.iter_mut().zip(last).for_each(|(out, value)| *out += value);
+        }
+    }
+
+    /// The same of as many as a vector holds, from the `first` place on.
+    #[inline(always)]
+    fn add_vector(&self, place: &impl Fn(i32) -> [i32; 2], first: i32, out: &mut [i32; LANES]) {
         let (width, squares) = (self.squares.width() as i32, self.squares.data());
         let Some(last) = squares.len().checked_sub(1) else { return };
-        for (line, out) in out.chunks_mut(LINE).enumerate() {
-            let first = (line * LINE) as i32;
-            // One after the other, for the first and the last of these loops become vectors.
-            let mut found = [0_i32; LINE];
-            let found = &mut found[..out.len()];
-            for (k, at) in (first..).zip(found.iter_mut()) {
-                let [x, y] = place(k);
-                *at = (y >> 16).wrapping_mul(width).wrapping_add(x >> 16);
-            }
-            for at in found.iter_mut() {
-                *at = squares[(*at as usize).min(last)] as i32;
-            }
-            for (k, (out, &square)) in (first..).zip(out.iter_mut().zip(&*found)) {
-                let [x, y] = place(k);
-                *out += within(square as u32, (x >> 8) & 0xff, (y >> 8) & 0xff);
-            }
+        // One after the other, for the first and the last of these loops become vectors.
+        let (mut found, mut part) = ([0; LANES], [[0; LANES]; 2]);
+        for k in 0..LANES {
+            let [x, y] = place(first + k as i32);
+            found[k] = (y >> 16).wrapping_mul(width).wrapping_add(x >> 16);
+            (part[0][k], part[1][k]) = ((x >> 8) & 0xff, (y >> 8) & 0xff);
+        }
+        for at in &mut found {
+            *at = squares[(*at as usize).min(last)] as i32;
+        }
+        for k in 0..LANES {
+            out[k] += within(found[k] as u32, part[0][k], part[1][k]);
         }
     }
 }
@@ -275,7 +285,7 @@ mod tests {
                     assert!((*value as f32 / ONE - 1.0 - at(u, v)).abs() < 13.5 / 256.0, "at ({u}, {v})");
                 }
             };
-            let mut out = [65536_i32; LINE + 3];
+            let mut out = [65536_i32; 4 * LANES + 3];
             source.levels[0].add_line_at_the_end(start, step, &mut out);
             check(&out);
             let mut out = [65536_i32; 9];
