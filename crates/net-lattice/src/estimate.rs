@@ -39,7 +39,7 @@ pub struct LatticeEstimate {
     pub evidence: Evidence,
     /// Log-likelihood gain of the net's drawing over an empty picture, per px of the working image.
     pub gain: f64,
-    /// Share of the gain by which the best rival period falls short; negative when a rival would be better.
+    /// Share of the gain by which the best rival period falls short (at least, if it is much); negative when a rival would be better.
     pub margin: f64,
     /// How much of the sheet was estimated.
     pub model: Model,

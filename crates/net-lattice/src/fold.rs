@@ -15,6 +15,7 @@ use crate::lockin::Measurement;
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::wrap;
 use crate::view::{BLOCK, Level, TileGrid};
+use crate::wide::widely;
 
 /// Cells folded side by side.
 const CELLS: usize = 6;
@@ -90,27 +91,7 @@ impl Folder {
     ) -> Fold {
         self.sums.clear();
         self.sums.resize(2 * WIDE * WIDE, [0.0; 2]);
-        let (bx, by) = level.blocks();
-        for y in 0..by {
-            let tiles = &measurements[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
-            for x in 0..bx {
-                if !tiles[usize::from(grid.column[x])].aligned() {
-                    continue;
-                }
-                let Some([p, q]) = map.block(x, y) else { continue };
-                let (p, q) = (bins(&p), bins(&q));
-                let sums = &mut self.sums[coin(x, y) * WIDE * WIDE..][..WIDE * WIDE];
-                for r in 0..BLOCK {
-                    let row = &level.thin.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
-                    for (c, i) in row.iter().enumerate() {
-                        let k = r * BLOCK + c;
-                        let sum = &mut sums[p[k] as usize * WIDE + q[k] as usize];
-                        sum[0] += (i * gain).clamp(-1.0, 1.0);
-                        sum[1] += 1.0;
-                    }
-                }
-            }
-        }
+        gather(&mut self.sums, level, map, gain, grid, measurements);
         let mut total = [[0.0; 2]; 2];
         for (total, sums) in total.iter_mut().zip(self.sums.chunks_exact(WIDE * WIDE)) {
             for sum in sums {
@@ -199,8 +180,42 @@ impl Folder {
     }
 }
 
+widely! {
+    /// Adds what the tiles show in which the lattice is.
+    fn gather<'a>(
+        sums: &'a mut [[f32; 2]],
+        level: &'a Level,
+        map: &'a PhaseMap,
+        gain: f32,
+        grid: &'a TileGrid,
+        measurements: &'a [Measurement],
+    ) -> () {
+        let (bx, by) = level.blocks();
+        for y in 0..by {
+            let tiles = &measurements[usize::from(grid.row[y]) * grid.nx..][..grid.nx];
+            for x in 0..bx {
+                if !tiles[usize::from(grid.column[x])].aligned() {
+                    continue;
+                }
+                let Some([p, q]) = map.block(x, y) else { continue };
+                let (p, q) = (bins(&p), bins(&q));
+                let half = &mut sums[coin(x, y) * WIDE * WIDE..][..WIDE * WIDE];
+                for r in 0..BLOCK {
+                    let row = &level.thin.row(y * BLOCK + r)[x * BLOCK..][..BLOCK];
+                    for (c, i) in row.iter().enumerate() {
+                        let k = r * BLOCK + c;
+                        let sum = &mut half[p[k] as usize * WIDE + q[k] as usize];
+                        sum[0] += (i * gain).clamp(-1.0, 1.0);
+                        sum[1] += 1.0;
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Bins of a block's pixels along one coordinate.
-#[inline]
+#[inline(always)]
 fn bins(plane: &Plane) -> [i32; BLOCK * BLOCK] {
     let mut bins = [0; BLOCK * BLOCK];
     for (k, bin) in bins.iter_mut().enumerate() {

@@ -134,10 +134,13 @@ impl Likelihood {
         let (bx, by) = level.blocks();
         (self.blocks_x, self.blocks_y) = (bx, by);
         let n = bx * by;
-        self.image.clear();
-        for y in 0..by {
-            let rows: [&[f32]; BLOCK] = std::array::from_fn(|r| level.high.row(y * BLOCK + r));
-            self.image.extend((0..bx).map(|x| std::array::from_fn(|k| rows[k / BLOCK][x * BLOCK + k % BLOCK])));
+        self.image.resize(n, [0.0; PIXELS]);
+        for (y, blocks) in self.image.chunks_exact_mut(bx).enumerate() {
+            for r in 0..BLOCK {
+                for (block, pixels) in blocks.iter_mut().zip(level.high.row(y * BLOCK + r).chunks_exact(BLOCK)) {
+                    block[r * BLOCK..][..BLOCK].copy_from_slice(pixels);
+                }
+            }
         }
         for buffer in [&mut self.drawn, &mut self.d1, &mut self.d2] {
             buffer.resize(n, [0.0; PIXELS]);

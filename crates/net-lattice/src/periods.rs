@@ -11,6 +11,8 @@ use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
 const RIVALS: [f64; 12] = [1.0 / 7.0, 1.0 / 6.0, 0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// Agreeing tiles without which all of the picture tells between rival periods.
 const FEWEST: usize = 4;
+/// Share of the best rival's worth below which others are no danger whatever they are worth: by how much they fall short is then a least.
+const HOPELESS: f64 = 0.4;
 /// Coherence, summed over both families, that a rival period has at least. Slid to where its twines seem to be, one that is not there has up to 3.4.
 const IN_STEP: f64 = 3.5;
 /// How often the period may change.
@@ -33,7 +35,7 @@ pub(crate) struct Rival {
 }
 
 impl Workspace {
-    /// Tests the rival periods until the best is the lock itself; returns it, and the share of its gain by which the second falls short. A rival may have
+    /// Tests the rival periods until the best is the lock itself; returns it, and the share of its gain by which the second falls short, at least. A rival may have
     /// rivals of its own: from the third harmonic of a net half as far as it, say.
     pub(crate) fn true_period(&mut self, mut lock: Lock) -> Option<(Lock, f64)> {
         let mut rivals = std::mem::take(&mut self.rivals);
@@ -113,6 +115,10 @@ impl Workspace {
         let (mut best, mut second) = ((f64::NEG_INFINITY, 0), f64::NEG_INFINITY);
         for (k, r) in rivals.iter().enumerate() {
             if r.gain <= second {
+                break;
+            }
+            if r.gain < HOPELESS * best.0 {
+                second = r.gain;
                 break;
             }
             let Some(there) = self.all_there(r) else { continue };

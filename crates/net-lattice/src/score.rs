@@ -95,13 +95,8 @@ fn vote(bank: &Bank, dual: &[Vector3<f64>; 2], normal: &Vector3<f64>) -> Votes {
     let [nx, ny, nz] = [normal.x as f32, normal.y as f32, normal.z as f32];
     let n = SIZE as f32;
     let length = bank.length as f32;
-    // A bin, the ones right and below, and the one across.
     let power = bank.power.as_slice();
-    let end = power.len().saturating_sub(SIZE + 1);
-    if end == 0 {
-        return Votes::default();
-    }
-    let at = [&power[..end], &power[1..][..end], &power[SIZE..][..end], &power[SIZE + 1..][..end]];
+    let Some(end) = power.len().checked_sub(SIZE + 2) else { return Votes::default() };
     let mut votes = Votes::default();
     for (group, places) in bank.places.iter().enumerate() {
         for (f, dual) in dual.iter().enumerate() {
@@ -130,21 +125,33 @@ fn vote(bank: &Bank, dual: &[Vector3<f64>; 2], normal: &Vector3<f64>) -> Votes {
                 if !(0..LANES).any(|l| h >= low[l] && h <= high[l]) {
                     continue;
                 }
-                let (mut sum, mut count) = ([0.0; LANES], [0.0; LANES]);
+                // One after the other, for the first and the last of these loops become vectors.
+                let (mut bin, mut fx, mut fy, mut counts) = ([0; LANES], [0.0; LANES], [0.0; LANES], [false; LANES]);
                 for l in 0..LANES {
                     let (px, py) = (h * u[l] * n, h * v[l] * n + 0.5 * n);
                     let inside = px < (COLUMNS - 1) as f32 && py >= 0.0 && py < (SIZE - 1) as f32;
-                    let counts = h >= low[l] && h <= high[l] && inside;
-                    let ((ix, fx), (iy, fy)) = (split(px), split(py));
+                    counts[l] = h >= low[l] && h <= high[l] && inside;
+                    let (ix, iy);
+                    ((ix, fx[l]), (iy, fy[l])) = (split(px), split(py));
                     let tile = (group * LANES + l) as u32;
-                    let bin = (tile * COLUMNS as u32).wrapping_add(ix).wrapping_mul(SIZE as u32).wrapping_add(iy);
-                    let k = (bin as usize).min(end - 1);
-                    let (a, b) = (at[0][k] + fy * (at[1][k] - at[0][k]), at[2][k] + fy * (at[3][k] - at[2][k]));
-                    let p = a + fx * (b - a);
+                    bin[l] = (tile * COLUMNS as u32).wrapping_add(ix).wrapping_mul(SIZE as u32).wrapping_add(iy);
+                }
+                // A bin, the one below, and those to their right.
+                let mut corner = [[0.0; LANES]; 4];
+                for (l, bin) in bin.into_iter().enumerate() {
+                    let k = (bin as usize).min(end);
+                    let (left, right) = (&power[k..][..2], &power[k + SIZE..][..2]);
+                    (corner[0][l], corner[1][l], corner[2][l], corner[3][l]) = (left[0], left[1], right[0], right[1]);
+                }
+                let (mut sum, mut count) = ([0.0; LANES], [0.0; LANES]);
+                for l in 0..LANES {
+                    let between = |a: f32, b: f32, part: f32| a + part * (b - a);
+                    let left = between(corner[0][l], corner[1][l], fy[l]);
+                    let right = between(corner[2][l], corner[3][l], fy[l]);
                     // Clipped softly: a plateau would hide where strong waves are highest.
-                    let vote = SOFT * log2_rough(1.0 + p * (1.0 / SOFT)) - NOISE;
-                    sum[l] = if counts { vote } else { 0.0 };
-                    count[l] = if counts { 1.0 } else { 0.0 };
+                    let vote = SOFT * log2_rough(1.0 + between(left, right, fx[l]) * (1.0 / SOFT)) - NOISE;
+                    sum[l] = if counts[l] { vote } else { 0.0 };
+                    count[l] = if counts[l] { 1.0 } else { 0.0 };
                 }
                 votes.sum[f][order] += sum.iter().sum::<f32>();
                 votes.count[f][order] += count.iter().sum::<f32>();

@@ -17,6 +17,9 @@ const TILTS: [f64; 8] = [0.0, 11.0, 22.0, 33.0, 44.0, 54.0, 63.0, 70.0];
 /// Steps of the depth scale to harmonic 1..6.
 const HARMONICS: [usize; 6] = [0, 12, 19, 24, 28, 31];
 
+/// Most steps of a table: from 3.7 px to 0.378 of a tile's 256 px they are 89.
+const STEPS: usize = 96;
+
 /// Score where too few tiles can tell.
 pub(crate) const NOTHING: f32 = -9.0;
 
@@ -119,6 +122,7 @@ impl Search {
         let base = view.focal / largest;
         let last = (12.0 * (largest / smallest).log2()).ceil() as usize + 1;
         let steps = last + HARMONICS[5] + 1;
+        debug_assert!(steps <= STEPS);
         let mut walks = Vec::with_capacity(bank.searched().count() * normals.len() * DIRECTIONS);
         for site in bank.searched() {
             for r in &normals {
@@ -179,14 +183,19 @@ impl Search {
         let cells = self.normals.len() * DIRECTIONS;
         let steps = self.steps;
         self.sums.fill(0.0);
+        let mut bins = [0; STEPS];
         let (tiles, _) = bank.coarse.as_chunks::<{ COLUMNS * SIZE }>();
         for (power, walks) in tiles.iter().zip(self.walks.chunks_exact(cells)) {
             for (w, sums) in walks.iter().zip(self.sums.chunks_exact_mut(steps)) {
                 let range = usize::from(w.first)..usize::from(w.end);
-                for (sum, p) in sums[range.clone()].iter_mut().zip(&self.power_of_step[range]) {
-                    let ix = nearest(w.x * p);
-                    let iy = nearest(w.y * p + (SIZE / 2) as f32);
-                    *sum += power[(ix.wrapping_mul(SIZE as u32).wrapping_add(iy) as usize).min(COLUMNS * SIZE - 1)];
+                // First where, which becomes vectors, then what is there.
+                let bins = &mut bins[..range.len()];
+                for (bin, p) in bins.iter_mut().zip(&self.power_of_step[range.clone()]) {
+                    let (ix, iy) = (nearest(w.x * p), nearest(w.y * p + (SIZE / 2) as f32));
+                    *bin = ix.wrapping_mul(SIZE as u32).wrapping_add(iy);
+                }
+                for (sum, bin) in sums[range].iter_mut().zip(bins) {
+                    *sum += power[(*bin as usize).min(COLUMNS * SIZE - 1)];
                 }
             }
         }

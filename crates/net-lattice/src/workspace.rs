@@ -145,17 +145,16 @@ impl Workspace {
                 }
             }
         }
+        let sides = [mesh.side1(), mesh.side2()];
+        let mut tools = Tools::default();
+        tools.likelihood.set_widths(sides.map(|side| config.twine_diameter_m / side));
         Self {
-            scope: Scope {
-                sides: [mesh.side1(), mesh.side2()],
-                angle: mesh.angle(),
-                angle_sigma: config.crossing_angle_sigma_deg.to_radians(),
-            },
+            scope: Scope { sides, angle: mesh.angle(), angle_sigma: config.crossing_angle_sigma_deg.to_radians() },
             prior: Prior { sigma: surface::prior(config), angle: mesh.angle() },
             banks,
             spectra: Spectra::new(),
             background: Background::default(),
-            tools: Tools::default(),
+            tools,
             candidates: Vec::new(),
             found: Vec::new(),
             locks: Vec::new(),
@@ -372,14 +371,13 @@ impl Workspace {
         best
     }
 
-    /// Makes sure that the likelihood has the high-passed picture of a level, and the twine's width.
+    /// Makes sure that the likelihood has the high-passed picture of a level.
     pub(crate) fn load_likelihood(&mut self, level: usize) {
         let t = &mut self.tools;
         if t.loaded != Some(level) {
             t.loaded = Some(level);
             t.likelihood.load(&self.view.levels[level]);
         }
-        t.likelihood.set_widths(self.scope.sides.map(|s| self.twine / s));
     }
 
     /// Refines on the drawing, of all blocks or one in four: one shift per tile and pass, the sheet fitted to those.
