@@ -7,7 +7,7 @@ mod scene;
 use net_geometry::nalgebra::{Vector2, Vector3};
 use net_geometry::{JunctionState, Mesh};
 use net_image::View;
-use net_junction::{AdjustConfig, NetAdjuster, TwineState};
+use net_junction::{AdjustConfig, LatticeMap, NetAdjuster, TwineState};
 use scene::{HEIGHT, Scene, Score, WIDTH, scene, score, view};
 
 fn adjust(scene: &Scene, predicted: &net_junction::ExpectedNet) -> Score {
@@ -69,6 +69,37 @@ fn the_grid_of_the_thesis_is_found_whole_and_nothing_beyond_its_end() {
     assert_eq!(got.inner_found, 1344);
     assert_eq!(got.named_wrong, 0);
     assert_eq!(got.right, got.found);
+}
+
+/// A prediction that knows nothing of the net beyond some cells.
+struct Ending<'a>(&'a net_junction::ExpectedNet, f64);
+
+impl LatticeMap for Ending<'_> {
+    fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
+        (i.abs().max(j.abs()) <= self.1).then(|| self.0.pixel(i, j)).flatten()
+    }
+    fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
+        self.0.pixels_per_metre(i, j)
+    }
+    fn seed(&self) -> Option<(i32, i32)> {
+        self.0.seed()
+    }
+}
+
+#[test]
+fn knots_lead_on_where_the_prediction_ends() {
+    let s = scene(1.2, 10.0, 25.0, 5.0);
+    let picture = s.draw();
+    let mut adjuster = NetAdjuster::new(WIDTH, HEIGHT, &AdjustConfig::default()).unwrap();
+    let junctions = adjuster.adjust(view(&picture), &Ending(&s.net, 6.0)).unwrap();
+    let seen: Vec<_> = junctions.iter().filter(|j| j.state == JunctionState::Seen).copied().collect();
+    let got = score(&seen, &s.nodes(-2.0), &s.inner_nodes(1.0, 5.0), 2.0);
+    println!("{got:?}, recall {:.4}", got.recall());
+    // 13 x 13 knots are predicted.
+    assert!(got.truth > 500, "{got:?}");
+    assert!(got.recall() > 0.98, "{got:?}");
+    assert_eq!(got.named_wrong, 0, "{got:?}");
+    assert_eq!(got.right, got.found, "{got:?}");
 }
 
 #[test]

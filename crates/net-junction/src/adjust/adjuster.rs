@@ -3,7 +3,7 @@ use net_geometry::{Junction, JunctionState};
 use net_image::GrayView;
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::{Graph, median};
+use crate::adjust::graph::{Graph, lower, median};
 use crate::adjust::grow::{Grower, Warped};
 use crate::adjust::locate::Locator;
 use crate::adjust::map::LatticeMap;
@@ -12,7 +12,7 @@ use crate::adjust::profile::{FINE_PX, Profiles, coarse_px};
 use crate::adjust::seen::{Witnesses, own_twines};
 use crate::adjust::solve::Solver;
 use crate::adjust::source::Source;
-use crate::adjust::spread::{Led, Spreader};
+use crate::adjust::spread::Spreader;
 use crate::adjust::template::Look;
 use crate::error::{Error, Result};
 
@@ -23,8 +23,10 @@ const SIGMA_MIN_PX: f64 = 0.03;
 const SHADING: f64 = 0.12;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
 const ROUNDS: [usize; 2] = [4, 3];
-/// How often knots may lead to another prediction, and how many of them, and which part of all, must be elsewhere than it says.
+/// How often knots may lead to another prediction, how often to one that goes farther, and how many of them, and which part of all, must be elsewhere than the last one
+/// says, or new.
 const LED: usize = 2;
+const CONTINUED: usize = 4;
 const LED_FEWEST: usize = 4;
 const LED_PART: usize = 100;
 /// Contrast of twine that may lead to other twine.
@@ -124,20 +126,24 @@ impl NetAdjuster {
             return Ok(&self.junctions);
         }
         // 2. All nodes, and once more from where the knots that hold lead if that is elsewhere.
-        let map = Warped { map, warp: &warp };
-        for pass in 0..=LED {
+        for pass in 0.. {
             self.measure(image, &mut look);
             let Self { config, source, graph, spreader, witnesses, presence, .. } = self;
             let strong = |n: usize| {
                 let own = own_twines(graph, n).into_iter().flatten().flatten();
                 own.map(|e| presence.twines[e].contrast).any(|c| c > LED_CONTRAST)
             };
-            let moved = spreader.spread(source, graph, &map, |n| witnesses.saw(n), strong, &look, config);
-            if moved < LED_FEWEST.max(graph.nodes.len() / LED_PART) || pass == LED {
+            let moved = spreader.spread(source, graph, |n| witnesses.saw(n), strong, pass > 0, &look, config);
+            let fresh = if pass < CONTINUED { spreader.settle(graph, (width, height), least) } else { 0 };
+            let many = LED_FEWEST.max(graph.nodes.len() / LED_PART);
+            if fresh < many && (moved < many || pass >= LED) {
                 break;
             }
-            spreader.settle(graph);
-            graph.build(&Led { map: &map, spreader }, width, height, least);
+            graph.build(spreader.continued(), width, height, least);
+            self.values.clear();
+            self.values.extend(graph.nodes.iter().map(|n| n.height as f32));
+            let small = lower(&mut self.values).map_or(cell, f64::from);
+            look.coarse_px = look.coarse_px.min(coarse_px(small));
             if graph.edges.is_empty() {
                 return Ok(&self.junctions);
             }

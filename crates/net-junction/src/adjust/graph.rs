@@ -228,6 +228,15 @@ pub(crate) fn upper(values: &mut [f32]) -> Option<f32> {
     Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
 }
 
+/// The value that nine of ten reach; reorders.
+pub(crate) fn lower(values: &mut [f32]) -> Option<f32> {
+    if values.is_empty() {
+        return None;
+    }
+    let at = values.len() / 10;
+    Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
+}
+
 /// Upper median; reorders.
 pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
     if values.is_empty() {

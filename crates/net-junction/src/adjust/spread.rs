@@ -1,8 +1,9 @@
 //! Outward from the knots that hold: each next knot is looked for where its neighbours' displacements lead, knot by knot.
 //!
 //! A polynomial follows a sheet that bends evenly. Where nets bend fast the prediction is a cell off within a few, but never within one: the
-//! displacement of a knot is the continuation of those of the knots beside it.
+//! displacement of a knot is the continuation of those of the knots beside it. Farther on, where the prediction is worth nothing or ends, its place is the continuation of theirs.
 
+mod continued;
 mod cross;
 
 use std::collections::VecDeque;
@@ -10,10 +11,10 @@ use std::collections::VecDeque;
 use net_geometry::nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
 
 use crate::adjust::config::AdjustConfig;
-use crate::adjust::graph::Graph;
-use crate::adjust::map::LatticeMap;
+use crate::adjust::graph::{Graph, Node};
 use crate::adjust::source::Source;
 use crate::adjust::template::{Kernels, Look};
+use continued::{Continued, fit_around};
 
 /// Knots each way that lead on, how many it takes to believe a knot that is where they lead, and how many to look for one.
 const REACH: i32 = 3;
@@ -27,21 +28,19 @@ const ALIKE_CELLS: f64 = 0.15;
 const UNSEEN_CELLS: f64 = 0.25;
 /// Difference of neighbours' displacements, cells, that no net has.
 const SEAM_CELLS: f64 = 0.35;
+/// From one step of the lattice to the next no net changes by more than this part.
+const UNSTEADY: f64 = 0.3;
 /// Ways from a node to those that come next: to the second, for one may be hidden.
 const STEPS: [(i32, i32); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (2, 0), (-2, 0), (0, 2), (0, -2)];
 /// Knots that moved by this, cells, were named wrongly or not found.
 const MOVED_CELLS: f64 = 0.2;
-/// Rings of nodes that are moved along without being found.
-const FILL_RINGS: usize = 4;
 /// Rings of nodes that are not seen and have names all the same: a hole is not much wider.
 const UNSEEN_RINGS: usize = 5;
 
 /// What is known of a node of the graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Knot {
-    /// Where the map has it, px; from there all displacements count, for the graph's own prediction has been led.
-    from: Vector2<f64>,
-    /// Displacement as it was believed to be, and as it is found.
+    /// Displacement from where the graph predicts it, px, as it was believed to be, and as it is found.
     believed: Vector2<f64>,
     shift: Vector2<f64>,
     known: bool,
@@ -59,11 +58,12 @@ pub(crate) struct Spreader {
     kernels: Kernels,
     knots: Vec<Knot>,
     named: Vec<bool>,
+    /// Whether the graph's prediction is what knots led to: then their places lead, not how far they are off it.
+    free: bool,
     doubtful: Vec<bool>,
     queue: VecDeque<u32>,
     found: Vec<(u32, Vector2<f64>)>,
-    /// By index, in order: displacement from the map.
-    places: Vec<((i32, i32), Vector2<f64>)>,
+    continued: Continued,
     profile: Vec<f32>,
     sums: Vec<i32>,
     responses: Vec<f32>,
@@ -77,24 +77,27 @@ impl Spreader {
     }
 
     /// Walks outward from the seen nodes nearest to the graph's first one, which is next to the seed, naming those that lie where the ones before them
-    /// lead, and looking for the others. Returns how many were found elsewhere than they were believed to be.
+    /// lead, and looking for the others. `free` if the graph is itself made of where knots led. Returns how many were found elsewhere than they were believed to be.
     pub fn spread(
         &mut self,
         source: &Source,
         graph: &Graph,
-        map: &impl LatticeMap,
         seen: impl Fn(usize) -> bool,
         strong: impl Fn(usize) -> bool,
+        free: bool,
         look: &Look,
         config: &AdjustConfig,
     ) -> usize {
+        self.free = free;
         self.kernels.start(look.coarse_px);
         self.knots.clear();
-        self.knots.extend(graph.nodes.iter().map(|node| {
-            let (i, j) = node.index;
-            let from = map.place(f64::from(i), f64::from(j)).map_or(node.predicted, |p| p.0);
-            let believed = node.pixel() - from;
-            Knot { from, believed, shift: believed, known: false, leads: false, tried: 0, amplitudes: [f32::NAN; 2] }
+        self.knots.extend(graph.nodes.iter().map(|node| Knot {
+            believed: node.shift,
+            shift: node.shift,
+            known: false,
+            leads: false,
+            tried: 0,
+            amplitudes: [f32::NAN; 2],
         }));
         self.named.clear();
         self.named.resize(graph.nodes.len(), false);
@@ -107,17 +110,20 @@ impl Spreader {
             if self.knots[k].known {
                 continue;
             }
-            let Some((led, slope, count)) = self.lead(graph, k) else { continue };
+            let Some((led, steps, count)) = self.lead(graph, k) else { continue };
             let (node, believed) = (&graph.nodes[k], self.knots[k].believed);
             let near = |at: Vector2<f64>| (believed - at).norm() < ALIKE_CELLS * node.height;
-            if seen(k) && near(led) && !self.doubtful[k] {
+            if seen(k) && near(led) && !self.doubtful[k] && self.steady(graph, k, believed) {
                 self.named[k] = true;
                 self.knots[k].leads = strong(k);
             } else if count as u32 <= self.knots[k].tried.max(FEWEST_TO_FIND - 1) || !node.inside {
                 continue;
             } else {
                 self.knots[k].tried = count as u32;
-                let Some(off) = self.find(source, graph, k, led, slope, look, config) else { continue };
+                let Some(off) = self.find(source, graph, k, led, steps, look, config) else { continue };
+                if !self.steady(graph, k, led + off) {
+                    continue;
+                }
                 self.knots[k].shift = led + off;
                 self.knots[k].leads = true;
                 self.named[k] = near(led + off);
@@ -141,6 +147,7 @@ impl Spreader {
                     && borders(graph, k, |n| self.knots[n].known)
                     && let Some((led, ..)) = self.lead(graph, k)
                     && (self.knots[k].believed - led).norm() < UNSEEN_CELLS * node.height
+                    && self.steady(graph, k, self.knots[k].believed)
                 {
                     self.found.push((k as u32, led));
                 }
@@ -152,13 +159,17 @@ impl Spreader {
         }
     }
 
-    /// Takes what was found for the places of nodes by index, as displacements from the map.
-    pub fn settle(&mut self, graph: &Graph) {
-        self.fill(graph);
-        self.places.clear();
+    /// Takes what was found for the next prediction, [`Self::continued`], in a picture of this size. Returns how many nodes it has in the picture that the graph did not have there.
+    pub fn settle(&mut self, graph: &Graph, size: (usize, usize), cell_min_px: f64) -> usize {
         let known = graph.nodes.iter().zip(&self.knots).filter(|(_, knot)| knot.known);
-        self.places.extend(known.map(|(node, knot)| (node.index, knot.shift)));
-        self.places.sort_unstable_by_key(|p| p.0);
+        let place = |(node, knot): (&Node, &Knot)| (node.index, (node.predicted + knot.shift).push(node.scale));
+        self.continued.settle(graph, known.map(place), graph.nodes.first().map(|n| n.index), size, cell_min_px)
+    }
+
+    /// Where the known knots are, and where they lead.
+    pub fn continued(&mut self) -> &Continued {
+        self.continued.smooth();
+        &self.continued
     }
 
     /// Around places where neighbours are displaced so differently that one of them has another twine's name. The walk must not
@@ -218,19 +229,44 @@ impl Spreader {
         })
     }
 
+    /// Whether the steps of the lattice to a node that lies `shift` off its prediction are like those before them. Where nothing but knots leads, a twine that is left out is not
+    /// noticed otherwise.
+    fn steady(&self, graph: &Graph, k: usize, shift: Vector2<f64>) -> bool {
+        let (i, j) = graph.nodes[k].index;
+        let at = |a, b| {
+            let n = graph.node_at((i + a, j + b)).filter(|&n| self.knots[n].known)?;
+            Some(graph.nodes[n].predicted + self.knots[n].shift)
+        };
+        let here = graph.nodes[k].predicted + shift;
+        !self.free
+            || STEPS[..4].iter().all(|&(a, b)| match (at(a, b), at(2 * a, 2 * b)) {
+                (Some(next), Some(after)) => ((here - next) - (next - after)).norm() < UNSTEADY * (next - after).norm(),
+                _ => true,
+            })
+    }
+
     /// What lies next to a node, and next to that, comes next.
     fn go_on(&mut self, graph: &Graph, k: usize) {
         let (i, j) = graph.nodes[k].index;
-        for (a, b) in STEPS {
+        let steps = if self.free { &STEPS[..4] } else { &STEPS };
+        for (a, b) in steps {
             if let Some(n) = graph.node_at((i + a, j + b)).filter(|&n| !self.knots[n].known) {
                 self.queue.push_back(n as u32);
             }
         }
     }
 
-    /// Where a node's known neighbours lead: its displacement, how that changes along both directions, and how many they are.
+    /// Where a node's known neighbours lead: its displacement, the steps of the lattice there, and how many they are.
     fn lead(&self, graph: &Graph, k: usize) -> Option<(Vector2<f64>, [Vector2<f64>; 2], usize)> {
         let (i, j) = graph.nodes[k].index;
+        if self.free {
+            let known = |a, b| graph.node_at((i + a, j + b)).filter(|&n| self.knots[n].known);
+            let (fit, count) = fit_around(|a, b| {
+                known(a, b).map(|n| (graph.nodes[n].predicted + self.knots[n].shift).push(graph.nodes[n].scale))
+            })?;
+            let row = |r: usize| Vector2::new(fit[(r, 0)], fit[(r, 1)]);
+            return Some((row(0) - graph.nodes[k].predicted, [row(1), row(2)], count));
+        }
         let (mut normal, mut right, mut count) = (Matrix3::zeros(), Matrix3x2::zeros(), 0);
         for b in -REACH..=REACH {
             for a in -REACH..=REACH {
@@ -251,38 +287,8 @@ impl Spreader {
         normal[(2, 2)] += ROUGHNESS.powi(2);
         let fit = normal.cholesky()?.solve(&right);
         let row = |r: usize| Vector2::new(fit[(r, 0)], fit[(r, 1)]);
-        Some((row(0), [row(1), row(2)], count))
-    }
-
-    /// Nodes around those that are known are taken along.
-    fn fill(&mut self, graph: &Graph) {
-        for _ in 0..FILL_RINGS {
-            self.found.clear();
-            for k in 0..graph.nodes.len() {
-                if !self.knots[k].known
-                    && borders(graph, k, |n| self.knots[n].known)
-                    && let Some((led, ..)) = self.lead(graph, k)
-                {
-                    self.found.push((k as u32, led));
-                }
-            }
-            for &(k, shift) in &self.found {
-                (self.knots[k as usize].shift, self.knots[k as usize].known) = (shift, true);
-            }
-        }
-    }
-
-    /// Displacement of a node from the map: its own, or the mean of those near it.
-    fn at(&self, index: (i32, i32)) -> Option<Vector2<f64>> {
-        let own = |index| self.places.binary_search_by_key(&index, |p| p.0).ok().map(|k| self.places[k].1);
-        own(index).or_else(|| {
-            (1..=2).find_map(|reach| {
-                let around = (-reach..=reach).flat_map(|a| (-reach..=reach).map(move |b| (a, b)));
-                let near = around.filter_map(|(a, b)| own((index.0 + a, index.1 + b)));
-                let (sum, count) = near.fold((Vector2::zeros(), 0), |(s, n), d| (s + d, n + 1));
-                (count > 0).then(|| sum / f64::from(count))
-            })
-        })
+        let steps = [0, 1].map(|f| self.step(graph, k, f) + row(1 + f));
+        Some((row(0), steps, count))
     }
 }
 
@@ -290,27 +296,4 @@ impl Spreader {
 fn borders(graph: &Graph, k: usize, such: impl Fn(usize) -> bool) -> bool {
     let (i, j) = graph.nodes[k].index;
     [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)].into_iter().any(|n| graph.node_at(n).is_some_and(&such))
-}
-
-/// A prediction, moved to where knots lead.
-pub(crate) struct Led<'a, M> {
-    pub map: &'a M,
-    pub spreader: &'a Spreader,
-}
-
-impl<M: LatticeMap> LatticeMap for Led<'_, M> {
-    fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
-        self.place(i, j).map(|p| p.0)
-    }
-    fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
-        self.map.pixels_per_metre(i, j)
-    }
-    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
-        let (p, scale) = self.map.place(i, j)?;
-        let moved = self.spreader.at((i.round() as i32, j.round() as i32)).unwrap_or_default();
-        Some((p + moved, scale))
-    }
-    fn seed(&self) -> Option<(i32, i32)> {
-        self.map.seed()
-    }
 }

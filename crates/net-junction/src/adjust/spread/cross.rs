@@ -28,7 +28,7 @@ impl Spreader {
         graph: &Graph,
         k: usize,
         led: Vector2<f64>,
-        slope: [Vector2<f64>; 2],
+        steps: [Vector2<f64>; 2],
         look: &Look,
         config: &AdjustConfig,
     ) -> Option<Vector2<f64>> {
@@ -39,7 +39,7 @@ impl Spreader {
         for family in 0..2 {
             let typical = self.typical(source, graph, k, family, look, config)?;
             let (normal, q, amplitude, reach) =
-                self.cross(source, graph, k, family, led, slope[family], Some(typical), look, config)?;
+                self.cross(source, graph, k, family, led, steps[family], Some(typical), look, config)?;
             let part = amplitude / typical;
             if !(part > AMPLITUDE_PARTS.0 && part < AMPLITUDE_PARTS.1) || q.abs() > reach {
                 return None;
@@ -74,7 +74,8 @@ impl Spreader {
                 };
                 if self.knots[n].amplitudes[family].is_nan() {
                     let here = self.knots[n].shift;
-                    let found = self.cross(source, graph, n, family, here, Vector2::zeros(), None, look, config);
+                    let step = self.step(graph, n, family);
+                    let found = self.cross(source, graph, n, family, here, step, None, look, config);
                     self.knots[n].amplitudes[family] = found.map_or(0.0, |f| f.2);
                 }
                 self.values.push(self.knots[n].amplitudes[family]);
@@ -84,14 +85,14 @@ impl Spreader {
     }
 
     /// The map's step along a direction.
-    fn step(&self, graph: &Graph, k: usize, family: usize) -> Vector2<f64> {
+    pub(super) fn step(&self, graph: &Graph, k: usize, family: usize) -> Vector2<f64> {
         let (i, j) = graph.nodes[k].index;
         let [next, last] = if family == 0 { [(i + 1, j), (i - 1, j)] } else { [(i, j + 1), (i, j - 1)] };
-        let from = |index| graph.node_at(index).map(|n| self.knots[n].from);
+        let from = |index| graph.node_at(index).map(|n| graph.nodes[n].predicted);
         match (from(last), from(next)) {
             (Some(last), Some(next)) => (next - last) * 0.5,
-            (None, Some(next)) => next - self.knots[k].from,
-            (Some(last), None) => self.knots[k].from - last,
+            (None, Some(next)) => next - graph.nodes[k].predicted,
+            (Some(last), None) => graph.nodes[k].predicted - last,
             (None, None) => graph.nodes[k].half_steps[family] * 2.0,
         }
     }
@@ -106,14 +107,14 @@ impl Spreader {
         k: usize,
         family: usize,
         shift: Vector2<f64>,
-        slope: Vector2<f64>,
+        step: Vector2<f64>,
         like: Option<f32>,
         look: &Look,
         config: &AdjustConfig,
     ) -> Option<(Vector2<f64>, f64, f32, f64)> {
         let node = &graph.nodes[k];
-        let arm = (self.step(graph, k, family) + slope) * ARM;
-        let middle = self.knots[k].from + shift;
+        let arm = step * ARM;
+        let middle = graph.nodes[k].predicted + shift;
         let normal = Vector2::new(-arm.y, arm.x) / arm.norm();
         let edge = graph.edge_from(k, family)?;
         let reach = f64::from(reach_px(graph, edge, config.search_cells[0]));
