@@ -71,6 +71,8 @@ pub(crate) struct Lines {
     pub structure: Vec<f32>,
     /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.
     pub level: Vec<f32>,
+    /// The largest amplitude over half of it.
+    pub strongest: Vec<f32>,
     /// First bin of the weakest half.
     weakest_from: Vec<usize>,
     row: Vec<f32>,
@@ -81,10 +83,10 @@ pub(crate) struct Lines {
 impl Lines {
     /// Amplitude of each line in parts of its template's, at the best common shift. `means` are those of the profiles.
     pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
-        let Self { full, whole, weakest, structure, level, .. } = self;
+        let Self { full, whole, weakest, strongest, structure, level, .. } = self;
         self.weakest_from.clear();
         self.weakest_from.resize(graph.edges.len(), 0);
-        for values in [&mut full.values, &mut whole.values, &mut weakest.values, structure, level] {
+        for values in [&mut full.values, &mut whole.values, &mut weakest.values, strongest, structure, level] {
             values.clear();
             values.resize(graph.edges.len(), f32::NAN);
         }
@@ -114,6 +116,7 @@ impl Lines {
             // The weakest half: a broken twine leaves stubs.
             let amplitudes = self.row[bins.clone()].windows(window).map(|half| half.iter().sum::<f32>());
             let weakest = amplitudes.clone().enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+            self.strongest[e] = amplitudes.clone().fold(f32::MIN, f32::max) / window as f32;
             self.weakest.values[e] = weakest.1 / window as f32;
             self.weakest_from[e] = bins.start + weakest.0;
             // The quietest of those that may be gone: stubs hang beside the line.

@@ -64,13 +64,13 @@ impl Outside {
         self.change(graph, twines, TwineState::Hidden, |o, r| o.hidden[r] >= o.missing[r].max(HIDDEN));
     }
 
-    /// Missing twines that do not make a hole together are doubtful: of the thousands in a picture, some look gone by chance.
-    pub fn claim(&mut self, graph: &Graph, twines: &mut [Twine], config: &AdjustConfig) {
+    /// Missing twines that do not make a hole together, without those that are `ambiguous`, are doubtful: of the thousands in a picture, some look gone by chance.
+    pub fn claim(&mut self, graph: &Graph, twines: &mut [Twine], ambiguous: &[bool], config: &AdjustConfig) {
         let gone = |t: &Twine| t.state == TwineState::Missing;
         self.join(graph, twines, gone);
         self.evidence.clear();
         self.evidence.resize(graph.nodes.len(), Evidence::default());
-        for twine in twines.iter().filter(|t| gone(t)) {
+        for (twine, _) in twines.iter().zip(ambiguous).filter(|(t, ambiguous)| gone(t) && !**ambiguous) {
             if let Some(cell) = beside(graph, twine)[0] {
                 let root = self.root(cell);
                 self.evidence[root].add(Evidence::of(twine, config));
