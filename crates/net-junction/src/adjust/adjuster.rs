@@ -150,7 +150,7 @@ impl NetAdjuster {
         }
         self.twine_m = look.twine_m;
         self.leave_out_unnamed();
-        self.presence.claim(&self.graph, &self.config);
+        self.presence.claim(&self.graph, |n| self.witnesses.saw(n), &self.config);
         self.report();
         Ok(&self.junctions)
     }

@@ -36,8 +36,10 @@ struct Evidence {
 }
 
 impl Evidence {
-    fn of(twine: &Twine, config: &AdjustConfig) -> Self {
-        let certain = f64::from(twine.llr) < config.hole_one_llr && f64::from(twine.contrast) > config.certain_contrast;
+    /// `held`: both its knots are seen.
+    fn of(twine: &Twine, held: bool, config: &AdjustConfig) -> Self {
+        let certain =
+            held && f64::from(twine.llr) < config.hole_one_llr && f64::from(twine.contrast) > config.certain_contrast;
         Self { sum: twine.llr, several: u32::from(twine.llr < SEVERAL.0), certain }
     }
 
@@ -65,15 +67,26 @@ impl Outside {
     }
 
     /// Missing twines that do not make a hole together, without those that are `ambiguous`, are doubtful: of the thousands in a picture, some look gone by chance.
-    pub fn claim(&mut self, graph: &Graph, twines: &mut [Twine], ambiguous: &[bool], config: &AdjustConfig) {
+    pub fn claim(
+        &mut self,
+        graph: &Graph,
+        twines: &mut [Twine],
+        ambiguous: &[bool],
+        seen: impl Fn(usize) -> bool,
+        config: &AdjustConfig,
+    ) {
         let gone = |t: &Twine| t.state == TwineState::Missing;
         self.join(graph, twines, gone);
         self.evidence.clear();
         self.evidence.resize(graph.nodes.len(), Evidence::default());
-        for (twine, _) in twines.iter().zip(ambiguous).filter(|(t, ambiguous)| gone(t) && !**ambiguous) {
-            if let Some(cell) = beside(graph, twine)[0] {
+        for (e, twine) in twines.iter().enumerate().filter(|(e, t)| gone(t) && !ambiguous[*e]) {
+            // A twine between knots that are not seen may as well be one where there is no net.
+            let ends = graph.edges[e].nodes.iter().filter(|&&n| seen(n as usize)).count();
+            if ends > 0
+                && let Some(cell) = beside(graph, twine)[0]
+            {
                 let root = self.root(cell);
-                self.evidence[root].add(Evidence::of(twine, config));
+                self.evidence[root].add(Evidence::of(twine, ends == 2, config));
             }
         }
         self.change(graph, twines, TwineState::Doubtful, |o, r| !o.evidence[r].is_hole(config));

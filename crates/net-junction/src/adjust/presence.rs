@@ -112,8 +112,8 @@ impl Presence {
     }
 
     /// What looks gone is gone where it is certain.
-    pub fn claim(&mut self, graph: &Graph, config: &AdjustConfig) {
-        self.outside.claim(graph, &mut self.twines, &self.ambiguous, config);
+    pub fn claim(&mut self, graph: &Graph, seen: impl Fn(usize) -> bool, config: &AdjustConfig) {
+        self.outside.claim(graph, &mut self.twines, &self.ambiguous, seen, config);
     }
 
     fn decide(&mut self, graph: &mut Graph, profiles: &Profiles, config: &AdjustConfig) {
