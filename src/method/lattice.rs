@@ -25,6 +25,8 @@ pub(crate) struct LatticeMethod {
     flow: FlowTracker,
     /// The last answer that was vouched for, and when.
     last: Option<(i64, LatticeEstimate)>,
+    /// Frames since.
+    frames_since: u32,
     /// When the frame was taken that the flow starts from, if its answer was vouched for.
     flow_from: Option<i64>,
     /// Whether the velocity spans a count begun anew that nothing has proved since.
@@ -45,6 +47,9 @@ const FOLLOWED_COSINE: f64 = 0.99939;
 
 /// Longest time over which names are carried on without a velocity.
 const LONGEST_GAP_NS: i64 = 1_000_000_000;
+/// Most frames without a pose after which the net may be guessed where it was: at a cell a frame the fourth after it is still within the vote's reach. Where the
+/// right shift is out of reach the vote may be sure of a wrong one.
+const LONGEST_GAP_FRAMES: u32 = 3;
 
 /// Twines that there is room for from the start.
 const TWINES: usize = 16384;
@@ -112,6 +117,7 @@ impl LatticeMethod {
             count: CellCount::new()?,
             flow: FlowTracker::new(width, height, &net_flow::Config { mode: Mode::Summed, ..Default::default() })?,
             last: None,
+            frames_since: 0,
             flow_from: None,
             velocity_in_doubt: false,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
@@ -129,6 +135,7 @@ impl LatticeMethod {
         junctions: &mut Vec<Junction>,
     ) -> Result<Option<Found>> {
         self.motion.carry(prior);
+        self.frames_since = self.frames_since.saturating_add(1);
         let mut expected = self.expect(timestamp_ns);
         // A prior, or a steady motion, says where the lattice is to a fraction of a cell, which is what following takes.
         let mut found = None;
@@ -176,6 +183,7 @@ impl LatticeMethod {
         self.flow_from = vouched.then_some(timestamp_ns);
         if vouched {
             self.last = Some((timestamp_ns, estimate));
+            self.frames_since = 0;
         }
         Ok(Some(Found { net, probability, track, connection, corrected, in_doubt }))
     }
@@ -195,7 +203,9 @@ impl LatticeMethod {
             (true, false) => Naming::Sure,
         };
         let steady = self.motion.predict(timestamp_ns).map(|pose| (pose, by_velocity));
-        let recent = self.last.as_ref().filter(|(then, _)| timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS);
+        let recent = self.last.as_ref().filter(|(then, _)| {
+            timestamp_ns.saturating_sub(*then) <= LONGEST_GAP_NS && self.frames_since <= LONGEST_GAP_FRAMES + 1
+        });
         let rest = recent.map(|(_, last)| last.pose);
         // A vague prior is worth less than a velocity.
         let vague = prior.filter(|(_, naming)| *naming == Naming::Guess);
