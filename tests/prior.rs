@@ -167,6 +167,24 @@ fn the_count_goes_on_when_the_net_was_out_of_view() {
 }
 
 #[test]
+fn after_a_long_gap_the_count_is_not_carried_on_by_where_the_net_was() {
+    // One frame, seven of open water while the camera goes on by 0.8 cells each, and the net again, 6.4 cells on: farther than the vote looks.
+    let mut world = World::new();
+    let truth: Vec<f64> = [0].into_iter().chain(8..16).map(|k| f64::from(k) * 0.8 * CELL_M).collect();
+    let mut found = vec![place(&world.frame(Some(truth[0]), None))];
+    for _ in 1..8 {
+        assert_eq!(world.frame(None, None).status, Status::NoNet);
+    }
+    for (k, x) in truth.iter().enumerate().skip(1) {
+        let estimate = world.frame(Some(*x), None);
+        let said = matches!(estimate.connection, Connection::Restarted | Connection::Recognised);
+        assert!(k > 1 || said, "{:?}", estimate.connection);
+        found.push(place(&estimate));
+    }
+    assert_eq!(silent_and_flagged(&found, &truth).0, 0, "{found:?}");
+}
+
+#[test]
 fn what_is_no_motion_is_refused_and_leaves_the_tracker_as_it_was() {
     let mut world = World::new();
     let before = place(&world.frame(Some(0.0), None));
