@@ -47,6 +47,7 @@ impl Fitter {
         influences: &mut Vec<Influence>,
     ) -> [[f64; PARAMETERS]; PARAMETERS] {
         influences.clear();
+        influences.reserve(observations.len());
         for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&self.jacobian) {
             if r[0].is_nan() {
                 continue;

@@ -40,13 +40,19 @@ impl Continued {
         cell_min_px: f64,
     ) -> usize {
         self.places.clear();
+        self.next.clear();
+        self.ring.clear();
+        // Room from the first picture on for what others may need: most pictures need none of it.
+        let room = (4 * graph.nodes.len()).next_power_of_two();
+        self.places.reserve(room);
+        self.next.reserve(room);
+        self.ring.reserve(room);
         self.places.extend(known);
         self.places.sort_unstable_by_key(|p| p.0);
         let away = |(i, j): (i32, i32)| seed.map(|s| i.abs_diff(s.0).max(j.abs_diff(s.1)));
         self.seed = self.places.iter().map(|p| p.0).min_by_key(|&index| away(index));
         let size = Vector2::new((width - 1) as f64, (height - 1) as f64);
         let inside = |at: &Vector3<f64>| at.x >= 0.0 && at.y >= 0.0 && at.x <= size.x && at.y <= size.y;
-        self.next.clear();
         self.next.extend_from_slice(&self.places);
         let mut fresh = 0;
         for _ in 0..RINGS {
