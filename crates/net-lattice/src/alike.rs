@@ -3,9 +3,17 @@
 use crate::fit::{Fitter, Observation, Robust};
 use crate::surface::{PARAMETERS, Params};
 
+/// Distance over which residuals of small and of large tiles may be alike, px of an 848 x 480 px picture: three tiles.
+pub(crate) const REACH_PX: [f64; 2] = [160.0, 320.0];
+
+/// Tiles whose residuals are alike, small ones and large ones, which are twice as wide: on simulated nets with uneven knots four small ones counted as one
+/// find the flat model, and bent nets lose nothing by it; large ones counted so miss bends.
+pub(crate) const ALIKE: [f64; 2] = [4.0, 1.0];
+
 /// What one tile does to the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Influence {
+    /// Its middle, full-resolution px.
     pixel: [f64; 2],
     /// Derivatives of both coordinates by the parameters.
     row: [Params; 2],

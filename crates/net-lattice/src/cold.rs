@@ -2,6 +2,7 @@
 
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
+use crate::alike::ALIKE;
 use crate::comb::Looks;
 use crate::config::Config;
 use crate::decision::Evidence;
@@ -46,10 +47,6 @@ const MOST: usize = 12;
 const DRAWN_CELL_PX: f64 = 20.0;
 /// Turn of the tilts about the one found from which a lock-in is tried again, rad.
 const OTHER: f64 = 0.16;
-/// Tiles whose residuals are alike, small ones and large ones, which are twice as wide: on simulated nets with uneven knots four small ones counted as one
-/// find the flat model, and bent nets lose nothing by it; large ones counted so miss bends.
-const ALIKE: [f64; 2] = [4.0, 1.0];
-
 impl Workspace {
     pub(crate) fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
         self.search();

@@ -3,6 +3,7 @@
 use net_geometry::Plane;
 use net_geometry::nalgebra::{Matrix3, Vector3};
 
+use crate::alike::REACH_PX;
 use crate::config::Config;
 use crate::covariance::{self, Doubt};
 use crate::decision::Evidence;
@@ -10,9 +11,6 @@ use crate::estimate::{Labels, LatticeEstimate};
 use crate::model::{self, Model};
 use crate::surface::Surface;
 use crate::workspace::{Lock, Workspace};
-
-/// Distance over which residuals of small tiles may be alike, px of an 848 x 480 px picture: three tiles.
-const REACH: f64 = 160.0;
 
 impl Workspace {
     /// The last pass on the drawing with the chosen model, evidence, covariance, and the result in the net frame.
@@ -31,16 +29,18 @@ impl Workspace {
         let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
         let scale = if followed { Self::coarse_scale_for } else { Self::scale_for };
         let place = scale(self, surface.depth);
-        let evidence = self.weigh(&surface, place, lock);
-        let mean_plane = self.mean_plane(&surface);
+        let weighed = self.weigh(&surface, place, lock);
         // What the average cell looks like does not change from picture to picture.
         let fold = if followed { lock.evidence.fold() } else { self.fold(&surface, place) };
-        let evidence = evidence.folded(fold);
-        let evidence = Evidence { above: lock.above, ..evidence };
+        let mean_plane = self.mean_plane(&surface);
         let bend = mean_plane.normal.angle(&surface.normal());
-        let evidence = evidence.bent(bend, surface.sides, surface.depth, config.height_length_m);
-        let reach =
-            REACH * self.view.size * if self.view.tiling_for(self.cell_px(surface.depth)) == 1 { 2.0 } else { 1.0 };
+        let evidence = Evidence { above: lock.above, ..weighed }.folded(fold).bent(
+            bend,
+            surface.sides,
+            surface.depth,
+            config.height_length_m,
+        );
+        let reach = REACH_PX[self.view.tiling_for(self.cell_px(surface.depth))] * self.view.size;
         let t = &mut self.tools;
         let scale = model::robust_scale(t.fitter.whiten(&t.observations), &mut t.scratch);
         let doubt = Doubt { scale, reach, side_ratio: config.side_ratio_sigma, bumps: evidence.bumps };

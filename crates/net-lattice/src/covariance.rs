@@ -1,7 +1,5 @@
 //! From the covariance of the sheet's parameters to that of the pose.
 
-use std::ops::AddAssign;
-
 use net_geometry::nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use crate::alike::Influence;
@@ -12,8 +10,9 @@ use crate::surface::{PARAMETERS, Params, Surface};
 /// What is known of the errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Errors {
-    /// Rotation (rad) then translation (m), perturbations in the camera frame.
+    /// Covariance: rotation (rad) then translation (m), perturbations in the camera frame.
     pub pose: Matrix6<f64>,
+    /// Standard deviations: of the depth on the axis, m; the normal's direction, rad; the place in the net plane, m; the crossing angle, rad.
     pub range: f64,
     pub tilt: f64,
     pub xy: f64,
@@ -101,7 +100,8 @@ fn pose(
     pose = 0.5 * (pose + pose.transpose());
     let normal: Vector3<f64> = surface.normal();
     let tilted = bumps * bumps * (Matrix3::identity() - normal * normal.transpose());
-    pose.fixed_view_mut::<3, 3>(0, 0).add_assign(&tilted);
+    let mut turned = pose.fixed_view_mut::<3, 3>(0, 0);
+    turned += tilted;
     let turn = pose.fixed_view::<3, 3>(0, 0).into_owned();
     let tilt = (0.5 * (turn.trace() - normal.dot(&(turn * normal)))).max(0.0).sqrt();
     let shift = pose.fixed_view::<3, 3>(3, 3).into_owned();
