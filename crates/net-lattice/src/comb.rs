@@ -58,12 +58,12 @@ impl Comb {
     /// For twine of `width` cells along both families, in cells of `cell` px of the level. The power of each harmonic in the middle one of the tiles stands
     /// for that of the noise: where the net is strong it makes all harmonics count alike.
     ///
-    /// `odd`: 1 where the fundamental is highest on the sheet's lines, -1 where it is lowest (dark twine on the lines).
+    /// `odd`: of each family 1 where the fundamental is highest on the sheet's lines, -1 where it is lowest (dark twine on the lines).
     pub(crate) fn new(
         sums: &[TileSum],
         width: [f64; 2],
         cell: f64,
-        odd: f64,
+        odd: [f64; 2],
         looks: Looks,
         scratch: &mut Vec<f64>,
     ) -> Self {
@@ -82,9 +82,9 @@ impl Comb {
                 let shape = bar.sin() / bar.max(1e-9) * (-0.5 * blur * blur).exp();
                 shape.max(0.0) / noise
                     * match k {
-                        0 => odd,
-                        _ if k % 2 == 1 => odd * looks[f],
-                        _ => odd * looks[f].abs(),
+                        0 => odd[f],
+                        _ if k % 2 == 1 => odd[f] * looks[f],
+                        _ => odd[f] * looks[f].abs(),
                     }
             })
         });

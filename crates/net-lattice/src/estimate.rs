@@ -43,8 +43,8 @@ pub struct LatticeEstimate {
     pub margin: f64,
     /// How much of the sheet was estimated.
     pub model: Model,
-    /// Bright or dark twine.
-    pub polarity: Polarity,
+    /// Bright or dark twine: lines of constant i, and of constant j. Light from aside can have one family brighter than the water and leave the other darker.
+    pub polarity: [Polarity; 2],
     /// Blur of the picture, px, one standard deviation, as chosen by likelihood among a few.
     pub blur: f64,
     /// How the twine looks to the lock-in.
@@ -96,6 +96,11 @@ impl Labels {
             }
         }
         Self { turns, origin: best.1 }
+    }
+
+    /// What belongs to the two families, from the sheet's order to that of X and the other, or back.
+    pub(crate) fn families<T: Copy>(&self, of: [T; 2]) -> [T; 2] {
+        if self.turns % 2 == 1 { [of[1], of[0]] } else { of }
     }
 
     /// Internal coordinates to (i, j).
@@ -151,7 +156,8 @@ pub(crate) struct Followed {
     pub surface: Surface,
     pub labels: Labels,
     pub pose: Pose,
-    pub polarity: Polarity,
+    /// In the sheet's order.
+    pub polarity: [Polarity; 2],
     pub blur: f64,
     pub looks: Looks,
     pub focus: f64,
@@ -167,7 +173,7 @@ impl LatticeEstimate {
             surface: self.surface,
             labels: self.labels,
             pose: self.pose,
-            polarity: self.polarity,
+            polarity: self.labels.families(self.polarity),
             blur: self.blur,
             looks: self.looks,
             focus: self.focus,

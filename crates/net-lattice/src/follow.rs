@@ -4,7 +4,6 @@ use net_geometry::Pose;
 
 use crate::config::Config;
 use crate::estimate::LatticeEstimate;
-use crate::likelihood::Polarity;
 use crate::model::Model;
 use crate::seed::Seed;
 use crate::workspace::{Lock, Workspace};
@@ -21,14 +20,14 @@ impl Workspace {
         let shift = predicted.translation - turn * last.pose.translation;
         let start = last.surface.seen_from(turn.matrix(), &shift)?;
         // Half a cell lies between the lock-in's zero and dark twine's drawing.
-        let half = if last.polarity == Polarity::Dark { 0.5 } else { 0.0 };
+        let half = last.polarity.map(|p| f64::from(p.offset()));
         let mut surface = start;
-        surface.offset = start.offset.map(|o| o - half);
+        surface.offset = std::array::from_fn(|f| start.offset[f] - half[f]);
         let seed = Seed { centre: self.view.centre, looks: last.looks };
         let model = last.model.max(Model::Rhomb);
         let place = self.coarse_scale_for(start.depth);
         surface = self.lock_on(place, &surface, &[(250.0, Model::Rhomb), (last.focus, model)], seed)?;
-        surface.offset = surface.offset.map(|o| o + half);
+        surface.offset = std::array::from_fn(|f| surface.offset[f] + half[f]);
         let lock = Lock {
             score: 0.0,
             above: 0.0,

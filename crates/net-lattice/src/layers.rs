@@ -9,6 +9,7 @@ use crate::config::Config;
 use crate::error::Result;
 use crate::estimate::LatticeEstimate;
 use crate::estimator::LatticeEstimator;
+use crate::likelihood::contrasts;
 use crate::numeric::wrap;
 use crate::paint::{Lines, at, each_pixel, slope};
 use crate::surface::Surface;
@@ -46,8 +47,7 @@ impl Workspace {
         self.high(0, cell);
         let level = &mut self.view.levels[0];
         self.tools.map.fill(&first.surface, level);
-        let sign = first.polarity.sign();
-        let lines = Lines::measured(&self.tools.map, level, sign)?;
+        let lines = Lines::measured(&self.tools.map, level, first.labels.families(first.polarity))?;
         let least = self.scope.sides.map(|s| 0.5 * (self.twine / s) as f32);
         let painted = lines.paint_over(&self.tools.map, level, least, first.blur, &mut self.tools.smoother)?;
         self.view.average_down();
@@ -67,6 +67,7 @@ impl Workspace {
         let level = &self.view.levels[0];
         let map = &mut self.tools.map;
         map.fill(&net.surface, level);
+        let (sign, both) = contrasts(net.labels.families(net.polarity));
         let mut profiles = [Profile::default(), Profile::default()];
         profiles.iter_mut().zip(self.scope.sides).for_each(|(p, s)| p.prepare(self.twine / s));
         let grid = &level.tiles[self.view.tiling_for(cell)];
@@ -82,8 +83,8 @@ impl Workspace {
                     if painted.row(row)[column] > 0.0 {
                         return;
                     }
-                    let cover = |f: usize| f64::from(look_up(rows[f], wrap(at(&planes[f], u, v))).0);
-                    let t = 1.0 - (1.0 - cover(0)) * (1.0 - cover(1));
+                    let [p, q] = std::array::from_fn(|f| look_up(rows[f], wrap(at(&planes[f], u, v))).0);
+                    let t = f64::from(sign[0] * p + sign[1] * q - both * p * q);
                     let i = f64::from(level.high.row(row)[column]);
                     for (sum, value) in tile.iter_mut().zip([1.0, t, t * t, i, i * t, i * i]) {
                         *sum += value;
@@ -103,7 +104,7 @@ impl Workspace {
             }
             room += 1.0;
             let noise = ((var_i - cov * cov / var_t) / n).max(1e-12);
-            seen += f64::from(u8::from(f64::from(net.polarity.sign()) * cov > 2.5 * (var_t * noise).sqrt()));
+            seen += f64::from(u8::from(cov > 2.5 * (var_t * noise).sqrt()));
         }
         // A handful of tiles proves nothing.
         seen / room.max(0.2 * (grid.nx * grid.ny) as f64)

@@ -75,7 +75,16 @@ pub enum Polarity {
 }
 
 impl Polarity {
-    pub(crate) const BOTH: [Self; 2] = [Self::Bright, Self::Dark];
+    /// Both families alike, as they nearly always are.
+    pub(crate) const ALIKE: [[Self; 2]; 2] = [[Self::Bright; 2], [Self::Dark; 2]];
+
+    /// Cells from where the lock-in has a twine, as if it were bright, to where it is.
+    pub(crate) fn offset(self) -> f32 {
+        match self {
+            Self::Bright => 0.0,
+            Self::Dark => 0.5,
+        }
+    }
 
     pub(crate) fn sign(self) -> f32 {
         match self {
@@ -85,14 +94,22 @@ impl Polarity {
     }
 }
 
+/// Contrast of both families, and how much of it is lost where they cross: twines alike are one there, a bright and a dark one nothing.
+#[inline]
+pub(crate) fn contrasts(polarity: [Polarity; 2]) -> ([f32; 2], f32) {
+    let sign = polarity.map(Polarity::sign);
+    (sign, 0.5 * (sign[0] + sign[1]))
+}
+
 /// How the net is drawn and compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Drawing {
-    pub polarity: Polarity,
+    /// Of each family: light from aside can have one brighter than the water and leave the other darker.
+    pub polarity: [Polarity; 2],
     /// Blur of the picture, px of the level, one standard deviation.
     pub blur: f64,
-    /// Added to both coordinates, cells: half a cell turns bright twine's lock-in into dark twine's.
-    pub offset: f32,
+    /// Added to the coordinates, cells: half a cell turns bright twine's lock-in into dark twine's.
+    pub offset: [f32; 2],
     /// Length over which the contrast may change, px of the level.
     pub contrast_length: f64,
     /// Length of the high-pass filter, px of the level.
@@ -187,6 +204,7 @@ impl Likelihood {
     #[inline(always)]
     fn draw_blocks<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing) {
         let bx = self.blocks_x;
+        let (sign, both) = contrasts(drawing.polarity);
         for y in 0..self.blocks_y {
             for x in 0..bx {
                 let b = y * bx + x;
@@ -203,18 +221,18 @@ impl Likelihood {
                     self.profiles[f].row(drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt())
                 });
                 let (t, d1, d2) = (&mut self.drawn[b], &mut self.d1[b], &mut self.d2[b]);
-                let [q1, q2] = planes.map(|p| positions(&p, drawing.offset));
+                let [q1, q2] = std::array::from_fn(|f| positions(&planes[f], drawing.offset[f]));
                 if SLOPES {
                     let ((p1, g1), (p2, g2)) = (look_up_all(rows[0], &q1), look_up_all(rows[1], &q2));
                     for k in 0..PIXELS {
-                        t[k] = 1.0 - (1.0 - p1[k]) * (1.0 - p2[k]);
-                        d1[k] = (1.0 - p2[k]) * g1[k];
-                        d2[k] = (1.0 - p1[k]) * g2[k];
+                        t[k] = sign[0] * p1[k] + sign[1] * p2[k] - both * p1[k] * p2[k];
+                        d1[k] = (sign[0] - both * p2[k]) * g1[k];
+                        d2[k] = (sign[1] - both * p1[k]) * g2[k];
                     }
                 } else {
                     let (p1, p2) = (look_up_all(rows[0], &q1).0, look_up_all(rows[1], &q2).0);
                     for k in 0..PIXELS {
-                        t[k] = 1.0 - (1.0 - p1[k]) * (1.0 - p2[k]);
+                        t[k] = sign[0] * p1[k] + sign[1] * p2[k] - both * p1[k] * p2[k];
                     }
                 }
                 *mean = total([t], |[t]| t) / PIXELS as f32;
@@ -236,15 +254,14 @@ impl Likelihood {
         }
     }
 
-    /// Local contrast of the drawing in the picture, of one sign.
+    /// Local contrast of the drawing in the picture; none where it would have to be turned over.
     fn fit_amplitude(&mut self, drawing: &Drawing, smoother: &mut Smoother) {
         correlate(self);
         let sigma = (drawing.contrast_length / BLOCK as f64) as f32;
         smoother.blur(&self.num, sigma, &mut self.smooth);
         smoother.blur(&self.den, sigma, &mut self.amplitude);
-        let sign = drawing.polarity.sign();
         for (a, n) in self.amplitude.data_mut().iter_mut().zip(self.smooth.data()) {
-            *a = (n / (*a + 3e-4) * sign).max(0.0) * sign;
+            *a = (n / (*a + 3e-4)).max(0.0);
         }
     }
 
@@ -365,10 +382,10 @@ impl Likelihood {
     /// No contrast beyond four times the median: a fish's edge is not twine.
     fn cap_amplitude(&mut self) {
         self.order.clear();
-        self.order.extend(self.amplitude.data().iter().filter(|a| **a != 0.0).map(|a| f64::from(a.abs())));
+        self.order.extend(self.amplitude.data().iter().filter(|a| **a != 0.0).map(|a| f64::from(*a)));
         let cap = (4.0 * median(&mut self.order)) as f32;
         for a in self.amplitude.data_mut() {
-            *a = a.clamp(-cap, cap);
+            *a = a.min(cap);
         }
     }
 

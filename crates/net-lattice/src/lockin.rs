@@ -39,8 +39,8 @@ impl Measurement {
 /// What tells where a tile's twines are.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Probe {
-    /// The fundamental, and the second harmonic by itself; 1 for bright twine, -1 for dark.
-    Waves(f64),
+    /// The fundamental, and the second harmonic by itself; 1 for a family of bright twine, -1 for dark.
+    Waves([f64; 2]),
     /// All harmonics together.
     Comb(Comb),
 }
@@ -128,7 +128,7 @@ pub(crate) fn measure(
                 m.k[f] = (pu.s[f] - p.s[f]).hypot(pv.s[f] - p.s[f]);
                 match probe {
                     Probe::Waves(sign) => {
-                        let [first, second, ..] = sum.z[f].map(|z| z.map(|z| sign * z));
+                        let [first, second, ..] = sum.z[f].map(|z| z.map(|z| sign[f] * z));
                         m.phase[f] = first[1].atan2(first[0]);
                         m.phase2[f] = second[1].atan2(second[0]);
                         m.snr[f] = (first[0].powi(2) + first[1].powi(2)) / (0.5 * sum.power + 1e-9);

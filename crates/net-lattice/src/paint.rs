@@ -3,6 +3,7 @@
 
 use net_image::Image;
 
+use crate::likelihood::Polarity;
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::{median, wrap};
 use crate::smooth::Smoother;
@@ -39,7 +40,8 @@ pub(crate) struct Lines {
 
 impl Lines {
     /// Measures the lattice of `map` on the high-passed picture. `None` where cells are too small, or nothing of it is in view.
-    pub(crate) fn measured(map: &PhaseMap, level: &Level, sign: f32) -> Option<Self> {
+    pub(crate) fn measured(map: &PhaseMap, level: &Level, polarity: [Polarity; 2]) -> Option<Self> {
+        let sign = polarity.map(Polarity::sign);
         let (bx, by) = level.blocks();
         let blocks = || (0..by).flat_map(|y| (0..bx).map(move |x| (x, y)));
         let open = || blocks().filter_map(|(x, y)| Some((x, y, map.block(x, y).filter(is_open)?)));
@@ -75,7 +77,7 @@ impl Lines {
         for (x, y, planes) in open() {
             each_pixel(x, y, |column, row, u, v| {
                 let s: [f32; 2] = std::array::from_fn(|f| at(&planes[f], u, v));
-                let value = sign * level.high.row(row)[column];
+                let value = level.high.row(row)[column];
                 squares += f64::from(value * value);
                 pixels += 1.0;
                 for f in 0..2 {
@@ -87,7 +89,7 @@ impl Lines {
                     if let Some(piece) = lines.piece(f, s) {
                         let bin = ((q / REACH + 1.0) * 0.5 * BINS as f32) as usize;
                         let sum = &mut profiles[f][piece * BINS + bin.min(BINS - 1)];
-                        sum[0] += value;
+                        sum[0] += sign[f] * value;
                         sum[1] += 1.0;
                     }
                 }

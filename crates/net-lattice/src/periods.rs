@@ -31,7 +31,7 @@ pub(crate) struct Rival {
     looks: Looks,
     /// What its drawing explains, of what the lock's does on the same level.
     gain: f64,
-    polarity: Polarity,
+    polarity: [Polarity; 2],
 }
 
 impl Workspace {
@@ -106,7 +106,7 @@ impl Workspace {
                 None => self.gain(&lock.surface, level, widest, &[lock.polarity], &[lock.blur]).0,
             };
             by_level[level] = Some(unit);
-            (r.gain, r.polarity, _) = self.gain(&r.surface, level, widest, &Polarity::BOTH, &[lock.blur]);
+            (r.gain, r.polarity, _) = self.gain(&r.surface, level, widest, &Polarity::ALIKE, &[lock.blur]);
             r.gain /= unit.abs().max(1e-9);
         }
         let unit = by_level[own_level].unwrap_or(0.0).abs();
@@ -140,7 +140,7 @@ impl Workspace {
     }
 
     /// Rivals share the tiles in which the lattice is: what a drawing explains of a fish must not tell between them.
-    fn look_where(&mut self, lock: &Lock) {
+    pub(crate) fn look_where(&mut self, lock: &Lock) {
         let place = self.scale_for(lock.surface.depth);
         self.measure_comb(&lock.surface, place, lock.seed.looks, &Window::ALL);
         let t = &mut self.tools;

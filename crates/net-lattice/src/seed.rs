@@ -48,7 +48,7 @@ impl Workspace {
     /// Reads the last sums by all looks.
     fn read_looks(&mut self, surface: &Surface, place: (usize, usize), gain: f32) {
         for (k, look) in LOOKS.into_iter().enumerate() {
-            self.comb(surface, place, 1.0, [look; 2], gain);
+            self.comb(surface, place, [1.0; 2], [look; 2], gain);
             let t = &mut self.tools;
             t.looks[k].clear();
             t.looks[k].extend(t.measurements.iter().map(Said::new));

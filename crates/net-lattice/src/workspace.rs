@@ -111,7 +111,7 @@ pub(crate) struct Lock {
     pub seed: Seed,
     pub evidence: Evidence,
     pub gain: f64,
-    pub polarity: Polarity,
+    pub polarity: [Polarity; 2],
     pub blur: f64,
     /// Standard deviation of the window about the optical axis in which the sheet is fitted, px of an 848 x 480 px picture.
     pub focus: f64,
@@ -227,7 +227,14 @@ impl Workspace {
     }
 
     /// The last sums read as combs.
-    pub(crate) fn comb(&mut self, surface: &Surface, place: (usize, usize), odd: f64, looks: Looks, gain: f32) -> Comb {
+    pub(crate) fn comb(
+        &mut self,
+        surface: &Surface,
+        place: (usize, usize),
+        odd: [f64; 2],
+        looks: Looks,
+        gain: f32,
+    ) -> Comb {
         let width = self.scope.sides.map(|s| self.twine / s);
         let cell = self.cell_px(surface.depth) / self.view.levels[place.0].scale;
         let t = &mut self.tools;
@@ -240,8 +247,9 @@ impl Workspace {
     /// behind.
     pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), lock: &Lock) -> Evidence {
         let gain = self.demodulate(surface, place, &Window::ALL);
-        let sign = f64::from(lock.polarity.sign());
-        self.comb(surface, place, sign, lock.seed.looks.map(|e| sign * e), gain);
+        let sign = lock.polarity.map(|p| f64::from(p.sign()));
+        let looks = std::array::from_fn(|f| sign[f] * lock.seed.looks[f]);
+        self.comb(surface, place, sign, looks, gain);
         let all = self.evidence_within(lock.focus);
         let t = &mut self.tools;
         let probe = Probe::Waves(sign);
@@ -252,7 +260,7 @@ impl Workspace {
     /// One lock-in by all harmonics together.
     pub(crate) fn measure_comb(&mut self, surface: &Surface, place: (usize, usize), looks: Looks, window: &Window) {
         let gain = self.demodulate(surface, place, window);
-        self.comb(surface, place, 1.0, looks, gain);
+        self.comb(surface, place, [1.0; 2], looks, gain);
     }
 
     /// What the last measurements say for the lattice.
@@ -321,14 +329,14 @@ impl Workspace {
     }
 
     /// How to draw and compare a net at `depth` on `level`, high-passed for cells of `cell` px.
-    pub(crate) fn drawing(&self, level: usize, cell: f64, polarity: Polarity, blur_px: f64) -> Drawing {
+    pub(crate) fn drawing(&self, level: usize, cell: f64, polarity: [Polarity; 2], blur_px: f64) -> Drawing {
         let scale = self.view.levels[level].scale;
         // The average over a level's pixel adds its own blur.
         let own = (1.0 - 1.0 / (scale * scale)).max(0.0) / 12.0;
         Drawing {
             polarity,
             blur: ((blur_px / scale).powi(2) + own).sqrt(),
-            offset: 0.0,
+            offset: [0.0; 2],
             contrast_length: (36.0 * self.view.size).max(0.8 * cell) / scale,
             high_pass: self.view.high_pass_px(cell) / scale,
             sparse: false,
@@ -342,19 +350,19 @@ impl Workspace {
         surface: &Surface,
         level: usize,
         cell: f64,
-        polarities: &[Polarity],
+        polarities: &[[Polarity; 2]],
         blurs: &[f64],
-    ) -> (f64, Polarity, f64) {
+    ) -> (f64, [Polarity; 2], f64) {
         self.high(level, cell);
         let area = self.view.levels[level].scale.powi(2);
-        let mut best = (f64::NEG_INFINITY, Polarity::Bright, 0.0);
+        let mut best = (f64::NEG_INFINITY, [Polarity::Bright; 2], 0.0);
         self.tools.map.fill(surface, &self.view.levels[level]);
         self.load_likelihood(level);
         for &blur in blurs {
             for &polarity in polarities {
                 let mut drawing = self.drawing(level, cell, polarity, blur);
                 drawing.sparse = true;
-                drawing.offset = if polarity == Polarity::Dark { 0.5 } else { 0.0 };
+                drawing.offset = polarity.map(Polarity::offset);
                 let t = &mut self.tools;
                 let gain = t.likelihood.gain(
                     &t.map,

@@ -31,8 +31,8 @@ struct Scene {
     offset: Vector2<f64>,
     mesh: Mesh,
     twine: f64,
-    /// Grey levels that twine adds to the background of 100.
-    contrast: f64,
+    /// Grey levels that twine adds to the background of 100: lines of constant first coordinate, and of constant second.
+    contrast: [f64; 2],
     /// Noise, grey levels.
     noise: f64,
     seed: u64,
@@ -49,7 +49,7 @@ impl Scene {
             offset: Vector2::new(0.013, -0.008),
             mesh,
             twine: 0.002,
-            contrast: 70.0,
+            contrast: [70.0; 2],
             noise: 10.0,
             seed: 7,
         }
@@ -66,7 +66,7 @@ impl Scene {
         const SUB: usize = 4;
         for v in 0..HEIGHT {
             for u in 0..WIDTH {
-                let mut covered = 0;
+                let mut twine = 0.0;
                 for k in 0..SUB * SUB {
                     let p = Vector2::new(
                         u as f64 + ((k % SUB) as f64 + 0.5) / SUB as f64 - 0.5,
@@ -83,9 +83,15 @@ impl Scene {
                     // Distance from a line of constant s is |fraction| times the spacing.
                     let d1 = (s1 - s1.round()).abs() * det / a2.norm();
                     let d2 = (s2 - s2.round()).abs() * det / a1.norm();
-                    covered += usize::from(d1.min(d2) < 0.5 * self.twine);
+                    let [first, second] = self.contrast;
+                    twine += match [d1, d2].map(|d| d < 0.5 * self.twine) {
+                        [true, true] => 0.5 * (first + second),
+                        [true, false] => first,
+                        [false, true] => second,
+                        [false, false] => 0.0,
+                    };
                 }
-                let bright = 100.0 + self.contrast * covered as f64 / (SUB * SUB) as f64 + self.noise * noise.gauss();
+                let bright = 100.0 + twine / (SUB * SUB) as f64 + self.noise * noise.gauss();
                 out[v * WIDTH + u] = bright.round().clamp(0.0, 255.0) as u8;
             }
         }
@@ -165,15 +171,25 @@ fn every_stage_is_better_than_the_one_before() {
 fn near_and_far_tilted_and_turned() {
     for (tilt, azimuth, roll, range) in [(3.0, 0.0, 0.0, 0.5), (25.0, 130.0, 20.0, 0.9), (40.0, 250.0, -35.0, 1.4)] {
         let e = expect_right(&Scene::flat(tilt, azimuth, roll, range, square()));
-        assert_eq!(e.polarity, Polarity::Bright);
+        assert_eq!(e.polarity, [Polarity::Bright; 2]);
     }
 }
 
 #[test]
 fn dark_twine_is_told_from_bright() {
     let mut scene = Scene::flat(20.0, 300.0, 10.0, 0.8, square());
-    scene.contrast = -60.0;
-    assert_eq!(expect_right(&scene).polarity, Polarity::Dark);
+    scene.contrast = [-60.0; 2];
+    assert_eq!(expect_right(&scene).polarity, [Polarity::Dark; 2]);
+}
+
+#[test]
+fn a_bright_family_and_a_dark_one_are_both_where_they_are() {
+    for contrast in [[70.0, -60.0], [-60.0, 70.0]] {
+        let mut scene = Scene::flat(35.0, 20.0, 5.0, 0.7, square());
+        scene.contrast = contrast;
+        let expected = contrast.map(|c| if c > 0.0 { Polarity::Bright } else { Polarity::Dark });
+        assert_eq!(expect_right(&scene).polarity, expected);
+    }
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn cells(scene: &Examined) -> Result<Vec<Cell>> {
     put("margin", of(|e| e.margin));
     put("blur_px", of(|e| e.blur));
     put("model", found.map(|e| format!("{:?}", e.model).to_lowercase()));
-    put("polarity", found.map(|e| format!("{:?}", e.polarity).to_lowercase()));
+    put("polarity", found.map(|e| e.polarity.map(|p| format!("{p:?}").to_lowercase()).join(" ")));
     put("ms", Some(format!("{:.1}", scene.ms)));
     // Every statistic that the probability stands on, by its own name.
     let known = found.is_some();
