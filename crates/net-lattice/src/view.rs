@@ -228,9 +228,9 @@ impl View {
     }
 
     /// Length scale, full-resolution px, of the high-pass filter of the lock-in: shorter than the other, so that of a fish only its outline
-    /// is left, and still longer than what twine is wide.
+    /// is left, and of clouds next to nothing, and still longer than what twine is wide.
     pub(crate) fn thin_px(&self, cell: f64) -> f64 {
-        stepped((0.3 * cell).max(4.0 * self.size.max(self.reduction as f64)))
+        stepped((0.2 * cell).max(4.0 * self.size.max(self.reduction as f64)))
     }
 
     /// Length scale, full-resolution px, of the high-pass filter of the drawing's comparison for a cell of that many px.
