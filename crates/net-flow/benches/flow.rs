@@ -67,6 +67,11 @@ fn stages(c: &mut Criterion) {
     let mut vote = CellVote::new(&VoteConfig::default()).expect("defaults");
     let pixel = |at: Vector2<f64>| Some(at * CELL + Vector2::new(420.0, 240.0));
     c.bench_function("vote", |bench| bench.iter(|| vote.update(view(black_box(&a)), (0, 0), pixel).compared));
+    // As in a run, where the flow has prepared the picture.
+    next.build(view(&b), 24);
+    c.bench_function("vote, picture flat already", |bench| {
+        bench.iter(|| vote.update_flat(black_box(&next), (0, 0), pixel).compared)
+    });
 }
 
 criterion_group!(benches, stages);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 use net_flow::vote::{CellVote, Verdict, VoteConfig, VoteResult};
-use net_image::GrayView;
+use net_image::{GrayView, Pyramid};
 use net_sim::{Image, Scenario, Simulator};
 
 /// Runs the vote over `frames`, each numbered wrong by `per_frame` cells more than the one before until the vote corrects it. Panics at a wrong decision.
@@ -74,6 +74,13 @@ fn nothing_to_see_is_blind() {
     assert_eq!(vote.update(view, (0, 0), |_| None).verdict, Verdict::Blind);
     assert_eq!(vote.update(view, (0, 0), |_| Some(Vector2::new(f64::NAN, 0.0))).verdict, Verdict::Blind);
     assert_eq!(vote.update(view, (i32::MAX, i32::MIN), square).verdict, Verdict::Blind);
+}
+
+#[test]
+fn an_empty_picture_is_blind() {
+    let mut vote = CellVote::new(&VoteConfig::default()).expect("valid");
+    let pixel = |at: Vector2<f64>| Some(at * 30.0 + Vector2::new(420.0, 240.0));
+    assert_eq!(vote.update_flat(&Pyramid::new(4), (0, 0), pixel).verdict, Verdict::Blind);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The picture cell by cell, its lattice subtracted.
 
 use nalgebra::Vector2;
-use net_image::Pyramid;
+use net_image::{GrayView, Pyramid};
 
 /// Samples along a cell's side.
 const SIDE: usize = 12;
@@ -111,20 +111,17 @@ impl Layout {
         };
         let nearest = (0..columns * rows).filter_map(sides).min_by_key(|(from_middle, _)| *from_middle);
         let Some((_, cell_px)) = nearest else { return false };
-        let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, picture.len() as f64 - 1.0) as usize;
+        let Some(highest) = picture.len().checked_sub(1) else { return false };
+        let level = (cell_px / SIDE as f64).log2().round().clamp(0.0, highest as f64) as usize;
         let Some(view) = picture.level(level) else { return false };
         let scale = f64::from(1u32 << level);
         for (k, (raw, valid)) in self.raw.iter_mut().zip(&mut cells.valid).enumerate() {
             let (i, j) = ((k % self.columns) as f64, (k / self.columns) as f64);
-            *valid = true;
-            for (s, value) in raw.iter_mut().enumerate() {
-                // A cell is half a mesh either way round its knot.
-                let place = |x: usize| (x as f64 + 0.5) / SIDE as f64 - 0.5;
-                let sample = at(i + place(s % SIDE), j + place(s / SIDE))
-                    .and_then(|p| net_image::bilinear(view, p.x / scale, p.y / scale));
-                *valid &= sample.is_some();
-                *value = sample.unwrap_or(0.0);
-            }
+            // A cell is half a mesh either way round its knot.
+            let place = |a: usize, b: usize| {
+                at(i + 0.5 * (a as f64 - 1.0), j + 0.5 * (b as f64 - 1.0)).map(|pixel| pixel / scale)
+            };
+            *valid = sample(view, place, raw).is_some();
             let mean = raw.iter().sum::<f32>() / CELL as f32;
             raw.iter_mut().for_each(|x| *x = if *valid { *x - mean } else { 0.0 });
         }
@@ -193,6 +190,29 @@ impl Layout {
             patch.iter_mut().for_each(|x| *x /= norm);
         }
     }
+}
+
+/// Samples a cell whose corners, middles of sides and middle lie at `place`s, 0 to 2 along either side: the quarters belong to four meshes, in each of which a lattice laid out by its
+/// knots is bilinear. `None` where some of it is outside.
+fn sample(
+    view: GrayView<'_>,
+    place: impl Fn(usize, usize) -> Option<Vector2<f64>>,
+    out: &mut [f32; CELL],
+) -> Option<()> {
+    const HALF: usize = SIDE / 2;
+    let part = |x: usize| (x as f64 + 0.5) / HALF as f64;
+    for b in 0..2 {
+        let (top, bottom) =
+            ([place(0, b)?, place(1, b)?, place(2, b)?], [place(0, b + 1)?, place(1, b + 1)?, place(2, b + 1)?]);
+        for y in 0..HALF {
+            let row: [_; 3] = std::array::from_fn(|a| top[a].lerp(&bottom[a], part(y)));
+            for x in 0..SIDE {
+                let p = row[x / HALF].lerp(&row[x / HALF + 1], part(x % HALF));
+                out[(b * HALF + y) * SIDE + x] = net_image::bilinear(view, p.x, p.y)?;
+            }
+        }
+    }
+    Some(())
 }
 
 /// Mean of the middle of a cell.
