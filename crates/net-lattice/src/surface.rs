@@ -310,8 +310,8 @@ impl Chart {
             for _ in 0..4 {
                 let (h, hx, hy) = self.height(a1 * depth - b1, a2 * depth - b2);
                 let slope = nd - hx * a1 - hy * a2;
-                // The sheet turns edge-on.
-                if slope < 0.25 * nd {
+                // The sheet turns edge-on, or is out of this world.
+                if !(slope >= 0.25 * nd && h.is_finite()) {
                     return None;
                 }
                 let step = (depth * nd - znz - h) / slope;
