@@ -12,7 +12,7 @@
 //! # Stages
 //! [`View`] and [`GrayView`] borrow, [`Image`] owns. [`convert`] changes the kind of pixel; [`GaussianBlur`] and
 //! [`BoxFilter`] smooth; [`Gradient`] differentiates; [`Pyramid`] halves; [`bilinear`] and [`bicubic`] read between
-//! pixels; [`Remap`] reads a whole picture that way.
+//! pixels; [`Remap`] reads a whole picture that way. [`widely!`] compiles loops for the widest instructions.
 //!
 //! ```
 //! use net_image::{GaussianBlur, GrayView, Image, bilinear};
@@ -39,6 +39,7 @@ mod pyramid;
 mod remap;
 mod sampling;
 mod view;
+mod wide;
 
 pub use box_filter::BoxFilter;
 pub use convert::ColourLayout;
@@ -47,6 +48,8 @@ pub use gaussian::GaussianBlur;
 pub use gradient::{Gradient, GradientKernel};
 pub use image::Image;
 pub use pixel::{Pixel, Sum};
+#[doc(hidden)]
+pub use pulp;
 pub use pyramid::Pyramid;
 pub use remap::Remap;
 pub use sampling::{bicubic, bicubic_with_gradient, bilinear};

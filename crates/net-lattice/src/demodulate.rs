@@ -3,12 +3,13 @@
 //! Lattice coordinates are linear within a block, so a wave there is a product of one along u and one along v, and four sines and cosines stand for all of the block's
 //! pixels. Blocks side by side are worked on at once.
 
+use net_image::widely;
+
 use crate::comb::HARMONICS;
 use crate::lockin::Window;
 use crate::map::PhaseMap;
 use crate::numeric::sin_cos_cycles;
 use crate::view::{BLOCK, Level};
-use crate::wide::widely;
 
 /// Sums over one tile.
 #[derive(Debug, Clone, Copy, Default)]

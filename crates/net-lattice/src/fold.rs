@@ -11,11 +11,12 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
+use net_image::widely;
+
 use crate::lockin::Measurement;
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::wrap;
 use crate::view::{BLOCK, Level, TileGrid};
-use crate::wide::widely;
 
 /// Cells folded side by side.
 const CELLS: usize = 6;

@@ -78,7 +78,6 @@ mod stages;
 mod surface;
 mod template;
 mod view;
-mod wide;
 mod workspace;
 
 pub use config::Config;

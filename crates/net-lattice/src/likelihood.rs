@@ -1,7 +1,7 @@
 //! The picture against a drawing of the net: how much better it is explained with the net than without, and by how much each tile would
 //! move the net.
 
-use net_image::Image;
+use net_image::{Image, widely};
 
 use crate::fit::Observation;
 use crate::map::{PhaseMap, Plane};
@@ -10,7 +10,6 @@ use crate::smooth::Smoother;
 use crate::surface::Surface;
 use crate::template::{Profile, look_up_all};
 use crate::view::{BLOCK, Level, TileGrid};
-use crate::wide::widely;
 
 /// Sum of a function of the blocks' pixels, eight sums side by side: what the processor adds at once.
 #[inline(always)]

@@ -1,12 +1,12 @@
 //! The score of one hypothesis on the unblurred spectra: power where the harmonics of both families should be, in all tiles.
 
 use net_geometry::nalgebra::Vector3;
+use net_image::widely;
 
 use crate::numeric::log2_rough;
 use crate::search::{Candidate, NOTHING, Scope};
 use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
 use crate::view::Site;
-use crate::wide::widely;
 
 /// Whitened power from which a wave's vote grows with the logarithm only.
 const SOFT: f32 = 4.0;

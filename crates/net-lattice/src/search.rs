@@ -5,10 +5,10 @@
 //! apart: harmonics 2, 3, 4, 5 and 6 are 12, 19.02, 24, 27.86 and 31.02 steps up, so harmonics are looked up as well.
 
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
+use net_image::widely;
 
 use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE, VARIANCE};
 use crate::view::View;
-use crate::wide::widely;
 
 /// Directions of dual vectors: every 5 degrees of the half circle.
 const DIRECTIONS: usize = 36;

@@ -1,9 +1,8 @@
 //! Gaussian smoothing at the price of its smallest resolution: average down, blur, interpolate up.
 
-use net_image::Image;
+use net_image::{Image, widely};
 
 use crate::numeric::magnitude_quantiles;
-use crate::wide::widely;
 
 /// Blurs with its buffers kept.
 #[derive(Debug, Default)]

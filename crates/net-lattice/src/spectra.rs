@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use net_geometry::Camera;
-use net_image::Image;
+use net_image::{Image, widely};
 use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
@@ -12,7 +12,6 @@ use crate::numeric::{clip_level, exp2_rough, log2_rough};
 use crate::score::Places;
 use crate::smooth::Smoother;
 use crate::view::{Site, View};
-use crate::wide::widely;
 
 /// Length of the transforms: tiles are shorter and padded with zeros.
 pub(crate) const SIZE: usize = 256;

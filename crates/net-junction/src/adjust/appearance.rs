@@ -1,6 +1,9 @@
 //! How twine looks in each neighbourhood, learned from it: whatever light, blur and colour do.
 
+use net_image::widely;
+
 use crate::adjust::graph::{Graph, upper};
+use crate::adjust::lanes::LANES;
 use crate::adjust::lines::{Means, SHIFT};
 use crate::adjust::profile::Profiles;
 
@@ -15,23 +18,30 @@ const ALIKE: std::ops::Range<f32> = 0.4..2.5;
 #[derive(Debug, Default)]
 pub(crate) struct Appearance {
     pub means: Means,
-    /// By block, `2 half + 1` values, free of constant and slope.
+    /// By block, `2 half + 1` values, free of constant and slope, and zeros up to a whole vector.
     templates: Vec<f32>,
+    /// By block: sum of squares.
+    energies: Vec<f32>,
     /// By block: whether the template is twine on the line.
     pub centred: Vec<bool>,
     amplitudes: Vec<f32>,
     rows: Vec<f32>,
     block_sums: Vec<f32>,
     sum: Vec<f32>,
-    energies: Vec<f32>,
+    strong: Vec<f32>,
     pub half: usize,
 }
 
 impl Appearance {
-    /// The template of a block.
-    pub fn template(&self, block: usize) -> &[f32] {
-        let width = 2 * self.half + 1;
-        &self.templates[block * width..][..width]
+    /// The template of a block, with zeros up to a whole vector, and its sum of squares.
+    #[inline(always)]
+    pub fn template(&self, block: usize) -> (&[f32], f32) {
+        let width = self.padded();
+        (&self.templates[block * width..][..width], self.energies[block])
+    }
+
+    fn padded(&self) -> usize {
+        (2 * self.half + 1).next_multiple_of(LANES)
     }
 
     /// Learns templates of `half` steps to each side, whose extreme may lie `beside` steps off the line.
@@ -40,12 +50,9 @@ impl Appearance {
         self.means.take(profiles, half);
         self.average(graph, false);
         // Once more without what looks absent.
-        self.amplitudes.clear();
-        for e in 0..graph.edges.len() {
-            let width = 2 * half + 1;
-            let template = &self.templates[graph.blocks.of_edge(e) * width..][..width];
-            self.amplitudes.push(self.means.best(e, template).1);
-        }
+        let mut amplitudes = std::mem::take(&mut self.amplitudes);
+        best_amplitudes(self, graph, &mut amplitudes);
+        self.amplitudes = amplitudes;
         self.average(graph, true);
         self.centre(beside);
     }
@@ -61,11 +68,15 @@ impl Appearance {
             self.rows.extend(self.means.row(e)[SHIFT..][..width].iter().map(|m| if known { *m } else { 0.0 }));
             self.rows.push(f32::from(known));
         }
-        let Self { rows, block_sums, sum, templates, .. } = self;
+        let padded = self.padded();
+        let Self { rows, block_sums, sum, templates, energies, .. } = self;
         graph.blocks.sum_members(row_width, |e| rows.get(e * row_width..)?.get(..row_width), block_sums);
         templates.clear();
-        templates.resize(graph.blocks.count() * width, 0.0);
-        for (block, template) in templates.chunks_exact_mut(width).enumerate() {
+        templates.resize(graph.blocks.count() * padded, 0.0);
+        energies.clear();
+        energies.resize(graph.blocks.count(), 1e-9);
+        for (block, template) in templates.chunks_exact_mut(padded).enumerate() {
+            let template = &mut template[..width];
             if graph.blocks.members(block).is_empty() {
                 continue;
             }
@@ -73,6 +84,7 @@ impl Appearance {
             let share = 1.0 / sum[width].max(1.0);
             template.iter_mut().zip(sum.iter()).for_each(|(t, s)| *t = share * s);
             remove_line(template);
+            energies[block] += template.iter().map(|t| t * t).sum::<f32>();
         }
     }
 
@@ -81,11 +93,10 @@ impl Appearance {
     fn centre(&mut self, beside: usize) {
         let half = self.half;
         self.centred.clear();
-        let energy = |template: &[f32]| template.iter().map(|t| t * t).sum::<f32>();
-        self.energies.clear();
-        self.energies.extend(self.templates.chunks_exact(2 * half + 1).map(energy).filter(|&e| e > 0.0));
-        let least = LEAST_ENERGY * upper(&mut self.energies).unwrap_or(0.0);
-        for template in self.templates.chunks_exact(2 * half + 1) {
+        self.strong.clear();
+        self.strong.extend(self.energies.iter().filter(|&&e| e > 1e-9));
+        let least = LEAST_ENERGY * upper(&mut self.strong).unwrap_or(0.0);
+        for (template, &energy) in self.templates.chunks_exact(self.padded()).zip(&self.energies) {
             // Broad twine reaches far to both sides: beyond it is zero, not at the mean.
             let end = 0.5 * (template[0] + template[2 * half]);
             let smooth = |k: usize| 0.25 * (template[k - 1] + 2.0 * template[k] + template[k + 1]) - end;
@@ -94,13 +105,24 @@ impl Appearance {
             let near = half.saturating_sub(beside).max(1)..=(half + beside).min(2 * half - 1);
             // Broad twine, blurred by motion, has a flat top whose highest point means nothing.
             let on_line = near.into_iter().any(|k| smooth(k) * extreme >= FLAT_TOP * extreme * extreme);
-            self.centred.push(on_line && energy(template) > least);
+            self.centred.push(on_line && energy > least);
         }
     }
 }
 
+widely! {
+    /// The amplitude of each line's mean profile in parts of its template's.
+    fn best_amplitudes<'a>(appearance: &'a Appearance, graph: &'a Graph, out: &'a mut Vec<f32>) -> () {
+        out.clear();
+        out.extend((0..graph.edges.len()).map(|e| {
+            let (template, energy) = appearance.template(graph.blocks.of_edge(e));
+            appearance.means.best(e, template, energy).1
+        }));
+    }
+}
+
 /// Takes constant and slope away.
-pub(crate) fn remove_line(values: &mut [f32]) {
+fn remove_line(values: &mut [f32]) {
     let n = values.len() as f32;
     let middle = 0.5 * (n - 1.0);
     let mean = values.iter().sum::<f32>() / n;

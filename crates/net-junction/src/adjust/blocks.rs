@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
+use net_image::widely;
+
 use crate::adjust::graph::{Edge, Node};
+use crate::adjust::lanes::LANES;
 
 /// Cells along a block's side.
 const SIDE: i32 = 3;
@@ -18,8 +21,8 @@ pub(crate) struct Blocks {
     starts: Vec<u32>,
     members: Vec<u32>,
     next: Vec<u32>,
-    keys: Vec<i32>,
-    scratch: Vec<i32>,
+    sorted: Vec<f32>,
+    scratch: Vec<f32>,
 }
 
 impl Blocks {
@@ -121,44 +124,129 @@ impl Blocks {
     /// Median of edges' values around each block into `out` (cleared first); NaN does not count, and blocks without any value get
     /// the overall median, or 0 if there is none. Empty blocks too.
     pub fn local_median(&mut self, values: &[f32], out: &mut Vec<f32>) {
-        let (mut keys, mut scratch) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.scratch));
+        let (mut sorted, mut scratch) = (std::mem::take(&mut self.sorted), std::mem::take(&mut self.scratch));
         // In the order of members, so that neighbours are three runs.
-        keys.clear();
-        keys.extend(self.members.iter().map(|&e| key(values[e as usize])));
-        let mut overall = None;
-        out.clear();
-        for block in 0..self.count() {
-            scratch.clear();
-            if !self.members(block).is_empty() {
-                self.around(block).into_iter().for_each(|run| scratch.extend_from_slice(&keys[self.members_of(run)]));
-            }
-            let middle = median_key(&mut scratch).or_else(|| {
-                *overall.get_or_insert_with(|| {
-                    scratch.clone_from(&keys);
-                    median_key(&mut scratch)
-                })
-            });
-            out.push(middle.map_or(0.0, value));
-        }
-        (self.keys, self.scratch) = (keys, scratch);
+        sorted.clear();
+        sorted.extend(self.members.iter().map(|&e| values[e as usize]));
+        medians_around(self, &sorted, &mut scratch, out);
+        (self.sorted, self.scratch) = (sorted, scratch);
     }
 }
 
-/// What is no number comes last.
-const NO_NUMBER: i32 = i32::MAX;
-
-/// A whole number that orders as the value does.
-fn key(value: f32) -> i32 {
-    let bits = value.to_bits() as i32;
-    if value.is_nan() { NO_NUMBER } else { bits ^ ((bits >> 31) & i32::MAX) }
+widely! {
+    /// Upper median of the members' values around each block.
+    fn medians_around<'a>(blocks: &'a Blocks, values: &'a [f32], scratch: &'a mut Vec<f32>, out: &'a mut Vec<f32>) -> () {
+        out.clear();
+        let mut overall = None;
+        for block in 0..blocks.count() {
+            scratch.clear();
+            if !blocks.members(block).is_empty() {
+                let runs = blocks.around(block).into_iter();
+                runs.for_each(|run| scratch.extend_from_slice(&values[blocks.members_of(run)]));
+            }
+            let middle = upper_median(scratch).or_else(|| {
+                *overall.get_or_insert_with(|| {
+                    scratch.clear();
+                    scratch.extend_from_slice(values);
+                    upper_median(scratch)
+                })
+            });
+            out.push(middle.unwrap_or(0.0));
+        }
+    }
 }
 
-fn value(key: i32) -> f32 {
-    f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
+/// Values that are left to be told apart one by one, and how many halvings get there unless some values are thousands of times the others.
+const FEW: usize = 8;
+const HALVINGS: usize = 24;
+
+/// Upper median of what are numbers; reorders. Halves the range in which it must be, for values are counted faster than they are sorted.
+#[inline(always)]
+fn upper_median(values: &mut Vec<f32>) -> Option<f32> {
+    let (mut low, mut high) = least_and_most(values);
+    let (mut below, mut up) = (up_to(values, low), up_to(values, high));
+    let rank = up / 2;
+    if below > rank || up == 0 {
+        return (up > 0).then_some(low);
+    }
+    // Above `low`, at most `high`: so many are no larger than each.
+    for _ in 0..HALVINGS {
+        if up - below <= FEW as u32 {
+            return Some(among_few(values, low, high, rank - below));
+        }
+        let middle = 0.5 * (low + high);
+        let count = up_to(values, middle);
+        // Chosen, not branched to: either is as likely.
+        let beyond = count > rank;
+        (high, up) = (if beyond { middle } else { high }, if beyond { count } else { up });
+        (low, below) = (if beyond { low } else { middle }, if beyond { below } else { count });
+    }
+    values.retain(|&v| v > low && v <= high);
+    let rank = ((rank - below) as usize).min(values.len().checked_sub(1)?);
+    Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
-/// Upper median of what are numbers; reorders.
-fn median_key(keys: &mut [i32]) -> Option<i32> {
-    let numbers = keys.iter().filter(|&&k| k != NO_NUMBER).count();
-    (numbers > 0).then(|| *keys.select_nth_unstable(numbers / 2).1)
+/// The value of this rank of those above `low` and at most `high`, which are few.
+#[inline(always)]
+fn among_few(values: &[f32], low: f32, high: f32, rank: u32) -> f32 {
+    let (mut few, mut count) = ([f32::INFINITY; FEW + 1], 0);
+    for &value in values {
+        few[count.min(FEW)] = value;
+        count += usize::from(value > low && value <= high);
+    }
+    few[count.min(FEW)] = f32::INFINITY;
+    let few = few.first_chunk::<FEW>().copied().unwrap_or([high; FEW]);
+    let enough = |v: &f32| few.iter().map(|w| u32::from(w <= v)).sum::<u32>() > rank;
+    few.iter().map(|v| if enough(v) { *v } else { f32::INFINITY }).fold(f32::INFINITY, f32::min)
+}
+
+/// Least and largest value.
+#[inline(always)]
+fn least_and_most(values: &[f32]) -> (f32, f32) {
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let (vectors, rest) = values.as_chunks::<LANES>();
+    for vector in vectors {
+        for k in 0..LANES {
+            // False for NaN.
+            low[k] = if vector[k] < low[k] { vector[k] } else { low[k] };
+            high[k] = if vector[k] > high[k] { vector[k] } else { high[k] };
+        }
+    }
+    let all = |lanes: [f32; LANES]| lanes.into_iter().chain(rest.iter().copied());
+    (all(low).fold(f32::INFINITY, f32::min), all(high).fold(f32::NEG_INFINITY, f32::max))
+}
+
+/// How many values do not exceed one.
+#[inline(always)]
+fn up_to(values: &[f32], most: f32) -> u32 {
+    values.iter().map(|&v| u32::from(v <= most)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_upper_median_is_the_sorted_ones_middle() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for round in 0..400 {
+            let count = round % 90;
+            let scale = [1.0, 1e30, 0.0, 1e-30][round / 90 % 4];
+            let mut values: Vec<f32> = (0..count).map(|_| random.random::<f32>() - 0.5).collect();
+            for (k, value) in values.iter_mut().enumerate() {
+                *value = match k % 11 {
+                    // Equal ones, none, and some far off.
+                    1 | 2 => 0.125,
+                    5 => f32::NAN,
+                    7 => scale * *value,
+                    _ => *value,
+                };
+            }
+            let mut sorted: Vec<f32> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+            sorted.sort_by(f32::total_cmp);
+            assert_eq!(upper_median(&mut values), sorted.get(sorted.len() / 2).copied(), "{round}");
+        }
+    }
 }

@@ -47,20 +47,28 @@ impl Covered {
         }
     }
 
-    /// That of the meshes beside a twine, and of those beside it or at its ends: the most.
-    pub fn at(&self, graph: &Graph, edge: &Edge) -> (f32, f32) {
+    /// That of the meshes beside a twine: the most.
+    pub fn beside(&self, graph: &Graph, edge: &Edge) -> f32 {
         let (i, j) = graph.nodes[edge.nodes[0] as usize].index;
-        let of_cells = |cells: &[(i32, i32)]| {
-            let edges = cells.iter().filter_map(|&c| graph.edge_from(graph.node_at(c)?, 0));
-            edges.map(|k| self.covered[k]).fold(0.0, f32::max)
-        };
-        let (beside, touching) = if edge.family == 0 {
-            ((i, j - 1), [(i - 1, j), (i - 1, j - 1), (i + 1, j), (i + 1, j - 1)])
-        } else {
-            ((i - 1, j), [(i, j - 1), (i - 1, j - 1), (i, j + 1), (i - 1, j + 1)])
-        };
-        let covered = of_cells(&[(i, j), beside]);
-        (covered, covered.max(of_cells(&touching)))
+        self.most(graph, [(i, j), if edge.family == 0 { (i, j - 1) } else { (i - 1, j) }])
+    }
+
+    /// That of the other meshes at its ends: the most.
+    pub fn at_ends(&self, graph: &Graph, edge: &Edge) -> f32 {
+        let (i, j) = graph.nodes[edge.nodes[0] as usize].index;
+        self.most(
+            graph,
+            if edge.family == 0 {
+                [(i - 1, j), (i - 1, j - 1), (i + 1, j), (i + 1, j - 1)]
+            } else {
+                [(i, j - 1), (i - 1, j - 1), (i, j + 1), (i - 1, j + 1)]
+            },
+        )
+    }
+
+    fn most<const N: usize>(&self, graph: &Graph, cells: [(i32, i32); N]) -> f32 {
+        let edges = cells.into_iter().filter_map(|c| graph.edge_from(graph.node_at(c)?, 0));
+        edges.map(|k| self.covered[k]).fold(0.0, f32::max)
     }
 }
 

@@ -1,7 +1,10 @@
 //! Each line measured against its neighbourhood's template: twines, and control lines half a cell aside.
 
-use crate::adjust::appearance::{Appearance, remove_line};
+use net_image::widely;
+
+use crate::adjust::appearance::Appearance;
 use crate::adjust::graph::Graph;
+use crate::adjust::lanes::{Detrend, LANES, dot};
 use crate::adjust::profile::Profiles;
 use crate::adjust::statistic::Statistic;
 
@@ -31,7 +34,7 @@ impl Means {
         let share = 1.0 / bins.len() as f32;
         let edges = profiles.inside.len() / profiles.bins;
         self.values.clear();
-        self.values.resize(edges * self.width, 0.0);
+        self.values.resize(edges * self.width + LANES, 0.0);
         self.inside.clear();
         for (e, row) in self.values.chunks_exact_mut(self.width).enumerate() {
             for bin in bins.clone() {
@@ -49,11 +52,11 @@ impl Means {
     }
 
     /// The shift at which a line is most like a template, and its amplitude there in parts of the template's.
-    pub fn best(&self, line: usize, template: &[f32]) -> (usize, f32) {
-        let energy = energy(template);
+    #[inline(always)]
+    pub fn best(&self, line: usize, template: &[f32], energy: f32) -> (usize, f32) {
         let mut best = (SHIFT, f32::MIN);
-        for (shift, part) in self.row(line).windows(template.len()).enumerate() {
-            let amplitude = dot(part, template) / energy;
+        for shift in 0..=2 * SHIFT {
+            let amplitude = dot(&self.values[line * self.width + shift..], template) / energy;
             if amplitude > best.1 {
                 best = (shift, amplitude);
             }
@@ -62,99 +65,120 @@ impl Means {
     }
 }
 
-/// Per edge: amplitude with its knots, over the whole of it between them, the smallest over half of it, and the least structure of a half that may be gone.
+/// Per edge: amplitude with its knots, over the whole of it between them, and the smallest and largest over half of it.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     pub full: Statistic,
     pub whole: Statistic,
     pub weakest: Statistic,
-    pub structure: Vec<f32>,
-    /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.
-    pub level: Vec<f32>,
     /// The largest amplitude over half of it.
     pub strongest: Vec<f32>,
     /// First bin of the weakest half.
-    weakest_from: Vec<usize>,
-    row: Vec<f32>,
-    part: Vec<f32>,
+    weakest_from: Vec<u32>,
+    /// By edge and bin: amplitudes.
+    amplitudes: Vec<f32>,
+    detrend: Detrend,
+    /// Bins between the knots.
+    middle: std::ops::Range<usize>,
     structures: Vec<f32>,
 }
 
-impl Lines {
+widely! {
     /// Amplitude of each line in parts of its template's, at the best common shift. `means` are those of the profiles.
-    pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
-        let Self { full, whole, weakest, strongest, structure, level, .. } = self;
-        self.weakest_from.clear();
-        self.weakest_from.resize(graph.edges.len(), 0);
-        for values in [&mut full.values, &mut whole.values, &mut weakest.values, strongest, structure, level] {
-            values.clear();
-            values.resize(graph.edges.len(), f32::NAN);
-        }
-        let (bins, half) = (middle_bins(profiles), appearance.half);
-        let window = bins.len().div_ceil(2);
-        let first = profiles.half - half - SHIFT;
-        let width = 2 * half + 1;
-        let middle = half / 2..width - half / 2;
+    fn reduce<'a>(
+        lines: &'a mut Lines,
+        graph: &'a Graph,
+        profiles: &'a Profiles,
+        means: &'a Means,
+        appearance: &'a Appearance,
+    ) -> () {
+        let Lines { full, whole, weakest, strongest, weakest_from, amplitudes, middle, .. } = lines;
+        let (bins, window) = (profiles.bins, middle.len().div_ceil(2));
+        let first = profiles.half - appearance.half - SHIFT;
         for e in (0..graph.edges.len()).filter(|&e| means.inside[e]) {
-            let template = appearance.template(graph.blocks.of_edge(e));
-            let energy = energy(template);
-            let (shift, whole) = means.best(e, template);
-            self.whole.values[e] = whole;
-            self.row.clear();
-            self.row.extend((0..profiles.bins).map(|b| {
-                let part = &profiles.row(e, b)[first + shift..][..width];
-                dot(part, template) / energy
-            }));
-            self.full.values[e] = self.row.iter().sum::<f32>() / profiles.bins as f32;
-            self.structures.clear();
-            for b in bins.clone() {
-                self.part.clear();
-                self.part.extend_from_slice(&profiles.row(e, b)[first + SHIFT..][..width]);
-                remove_line(&mut self.part);
-                self.structures.push((dot(&self.part, &self.part) / width as f32).sqrt());
+            let (template, energy) = appearance.template(graph.blocks.of_edge(e));
+            let (shift, best) = means.best(e, template, energy);
+            whole.values[e] = best;
+            let row = &mut amplitudes[e * bins..][..bins];
+            for (b, amplitude) in row.iter_mut().enumerate() {
+                *amplitude = dot(profiles.from(e, b, first + shift), template) / energy;
             }
+            full.values[e] = row.iter().sum::<f32>() / bins as f32;
             // The weakest half: a broken twine leaves stubs.
-            let amplitudes = self.row[bins.clone()].windows(window).map(|half| half.iter().sum::<f32>());
-            let weakest = amplitudes.clone().enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-            self.strongest[e] = amplitudes.clone().fold(f32::MIN, f32::max) / window as f32;
-            self.weakest.values[e] = weakest.1 / window as f32;
-            self.weakest_from[e] = bins.start + weakest.0;
-            // The quietest of those that may be gone: stubs hang beside the line.
-            let structures = self.structures.windows(window).map(|half| half.iter().sum::<f32>());
-            let gone = amplitudes.map(|sum| sum <= weakest.1.max(GONE * window as f32));
-            let quietest = structures.zip(gone).filter(|(_, gone)| *gone).map(|(structure, _)| structure);
-            self.structure[e] = quietest.fold(f32::MAX, f32::min) / window as f32;
-            let half = self.weakest_from[e]..self.weakest_from[e] + window;
-            let mut level = 0.0;
-            for b in half {
-                level += profiles.row(e, b)[first + SHIFT..][middle.clone()].iter().sum::<f32>();
+            let (mut least, mut most) = ((0, f32::MAX), f32::MIN);
+            for (from, half) in row[middle.clone()].windows(window).enumerate() {
+                let sum = half.iter().sum::<f32>();
+                least = if sum < least.1 { (from, sum) } else { least };
+                most = most.max(sum);
             }
-            self.level[e] = level / (window * middle.len()) as f32;
+            weakest.values[e] = least.1 / window as f32;
+            strongest[e] = most / window as f32;
+            weakest_from[e] = (middle.start + least.0) as u32;
         }
     }
 }
 
 impl Lines {
+    /// Measures all lines.
+    pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
+        let edges = graph.edges.len();
+        for values in [&mut self.full.values, &mut self.whole.values, &mut self.weakest.values, &mut self.strongest] {
+            values.clear();
+            values.resize(edges, f32::NAN);
+        }
+        self.weakest_from.clear();
+        self.weakest_from.resize(edges, 0);
+        self.amplitudes.resize(edges * profiles.bins, 0.0);
+        self.middle = middle_bins(profiles);
+        self.detrend.start(appearance.half);
+        reduce(self, graph, profiles, means, appearance);
+    }
+
+    fn window(&self) -> usize {
+        self.middle.len().div_ceil(2)
+    }
+
+    fn weakest_bins(&self, e: usize) -> std::ops::Range<usize> {
+        let from = self.weakest_from[e] as usize;
+        from..from + self.window()
+    }
+
+    /// The least structure of a half of a line that may be gone: what constant and slope leave, root of mean squares. The quietest of those, for stubs hang beside
+    /// the line.
+    #[inline(always)]
+    pub fn structure(&mut self, e: usize, profiles: &Profiles) -> f32 {
+        let (half, window) = (self.detrend.half(), self.window());
+        let width = (2 * half + 1) as f32;
+        let Self { structures, detrend, middle, .. } = self;
+        structures.clear();
+        structures
+            .extend(middle.clone().map(|b| (detrend.rest(profiles.from(e, b, profiles.half - half)) / width).sqrt()));
+        let amplitudes = self.amplitudes[e * profiles.bins..][..profiles.bins][self.middle.clone()].windows(window);
+        let most = self.weakest.values[e].max(GONE);
+        let gone = amplitudes.map(|half| half.iter().sum::<f32>() / window as f32 <= most);
+        let of_halves = self.structures.windows(window).zip(gone).filter(|(_, gone)| *gone);
+        of_halves.map(|(half, _)| half.iter().sum::<f32>()).fold(f32::MAX, f32::min) / window as f32
+    }
+
+    /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.
+    pub fn level(&self, e: usize, profiles: &Profiles) -> f32 {
+        let (bins, half) = (self.weakest_bins(e), self.detrend.half());
+        let (from, width) = (profiles.half - (half - half / 2), 2 * (half - half / 2) + 1);
+        let count = bins.len() * width;
+        bins.map(|b| profiles.row(e, b)[from..][..width].iter().sum::<f32>()).sum::<f32>() / count as f32
+    }
+
     /// The largest amplitude, in parts of the template's, that the weakest half of a line has within [`BESIDE`] cells of `height` px, as far as it was sampled.
-    pub fn elsewhere(&self, e: usize, template: &[f32], profiles: &Profiles, height: f32) -> f32 {
-        let window = middle_bins(profiles).len().div_ceil(2);
-        let bins = self.weakest_from[e]..self.weakest_from[e] + window;
+    pub fn elsewhere(&self, e: usize, (template, energy): (&[f32], f32), profiles: &Profiles, height: f32) -> f32 {
+        let bins = self.weakest_bins(e);
         let amplitude = |shift: usize| {
-            let sum = bins.clone().map(|b| dot(&profiles.row(e, b)[shift..][..template.len()], template)).sum::<f32>();
-            sum / (energy(template) * window as f32)
+            let sum = bins.clone().map(|b| dot(profiles.from(e, b, shift), template)).sum::<f32>();
+            sum / (energy * bins.len() as f32)
         };
-        let middle = profiles.half - template.len() / 2;
+        let middle = profiles.half - self.detrend.half();
         let most = ((BESIDE * height / profiles.step_px as f32) as usize).min(middle);
         (middle - most..=middle + most).map(amplitude).fold(f32::MIN, f32::max)
     }
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn energy(template: &[f32]) -> f32 {
-    dot(template, template) + 1e-9
 }
 
 /// Bins in the middle part of the twine; of one bin, or where knots leave nothing, all.

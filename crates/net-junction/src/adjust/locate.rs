@@ -1,5 +1,7 @@
 //! Where each twine lies, bin by bin: matched filter, local polarity, local amplitude.
 
+use net_image::widely;
+
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Edge, Graph, bend, median, upper};
 use crate::adjust::profile::{COARSE_PX, Profiles};
@@ -44,8 +46,10 @@ pub(crate) struct Locator {
     block_lines: Vec<f32>,
     /// By block.
     signs: Vec<f32>,
-    /// By edge and bin: offset, in steps, at which twine is picked, and the amplitude there.
-    picked: Vec<(usize, f32)>,
+    /// By edge and bin: amplitude where twine is picked; NaN where it is not.
+    picked: Vec<f32>,
+    /// At every offset: the bin's amplitude, the less the farther it is from where it is believed to be.
+    near: Vec<f32>,
     /// By edge: twine's typical amplitude; by block: around it.
     amplitudes: Vec<f32>,
     typical: Vec<f32>,
@@ -95,7 +99,7 @@ impl Locator {
                 let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
                 let kernel =
                     self.kernels.get(width, look.spread_px, 0.5 * look.blur_m[family] * (a.scale + b.scale), half);
-                let found = self.kernels.match_at(&kernel, scratch.row(e, 0), half);
+                let found = self.kernels.match_at(&kernel, scratch.from(e, 0, 0), half);
                 self.scratch.push(found.gain / found.rest.max(1e-9));
             }
             let explained = upper(&mut self.scratch).unwrap_or(0.0);
@@ -142,10 +146,10 @@ impl Locator {
                     let width = (0.5 * twine * (a.scale + b.scale)).max(0.15);
                     let blur = blur / scale * 0.5 * (a.scale + b.scale);
                     let kernel = kernels.get(width, look.spread_px, blur, half);
-                    let profile = scratch.row(e, 0);
+                    let profile = scratch.from(e, 0, 0);
                     // The same for all kernels, which are of the same length.
                     if rests.len() == n * places {
-                        rests.extend((0..places).map(|k| kernels.rest(&kernel, profile, half + k).max(1e-9)));
+                        rests.extend((0..places).map(|k| kernels.rest(&kernel, &profile[k..]).max(1e-9)));
                     }
                     kernels.amplitudes(&kernel, profile, half, amplitudes);
                     let shares = amplitudes.iter().zip(&rests[n * places..]).map(|(a, rest)| kernel.gain(*a) / rest);
@@ -222,54 +226,64 @@ impl Locator {
 
     /// Measures where twine lies within reach of where `solver` has it, into `offsets` and `weights`.
     pub fn pick(&mut self, graph: &mut Graph, solver: Option<&Solver>) {
-        let (bins, places) = (self.profiles.bins, 2 * self.steps + 1);
-        let step = self.profiles.step_px as f32;
+        let bins = graph.edges.len() * self.profiles.bins;
         self.picked.clear();
+        self.picked.reserve(bins);
         self.offsets.clear();
+        self.offsets.reserve(bins);
         self.weights.clear();
-        for (e, edge) in graph.edges.iter().enumerate() {
-            let (sign, reach) = (self.signs[graph.blocks.of_edge(e)], self.reaches[e]);
-            let kernel = &self.kernel_of_edge[e];
-            let inverse = 1.0 / (0.6 * reach + 0.3).powi(2);
-            for bin in 0..bins {
-                let along = self.profiles.along[bin];
-                let [bow, s_bend] = bend(along);
-                // The profile's middle lies on the line as it was when it was sampled.
-                let bent = bow * edge.bow[0] + s_bend * edge.bow[1];
-                let believed = solver.map_or(0.0, |s| s.offset(graph, e, along) - bent);
-                let row = &self.responses[(e * bins + bin) * places..][..places];
-                let middle = believed / step + self.steps as f32;
-                let low = (middle - reach / step).ceil().clamp(0.0, (places - 1) as f32) as usize;
-                let high = (middle + reach / step).floor().clamp(0.0, (places - 1) as f32) as usize;
-                let mut best = (0, 0.0_f32);
-                for (k, &amplitude) in row.iter().enumerate().take(high + 1).skip(low) {
-                    let q = (k as f32 - middle) * step;
-                    // A bell without an exponential.
-                    let near = 1.0 / (1.0 + 0.25 * q * q * inverse).powi(2);
-                    let amplitude = (amplitude * sign).max(0.0) * near;
-                    if amplitude > best.1 {
-                        best = (k, amplitude);
-                    }
-                }
-                let k = best.0.clamp(1, places - 2);
-                let part = vertex([k - 1, k, k + 1].map(|k| row[k] * sign));
-                let q = (k as f32 - self.steps as f32 + part) * step;
-                self.offsets.push(q + bent);
-                let good = best.1 > 0.0 && self.profiles.inside[e * bins + bin] && (q - believed).abs() < 0.98 * reach;
-                let amplitude = row[best.0].abs();
-                self.picked.push((best.0, if good { amplitude } else { f32::NAN }));
-                // The squared sum that the template leaves, for now.
-                let rest = if good {
-                    let at = best.0 + self.profiles.half - self.steps;
-                    let rest = self.kernels.rest(kernel, self.profiles.row(e, bin), at) - kernel.gain(amplitude);
-                    (rest.max(1e-6) * step / REST_PX).sqrt()
-                } else {
-                    f32::NAN
-                };
-                self.weights.push(rest);
-            }
-        }
+        self.weights.reserve(bins);
+        self.near.clear();
+        self.near.resize(2 * self.steps + 1, 0.0);
+        pick_all(self, graph, solver);
         self.weigh(graph);
+    }
+
+    #[inline(always)]
+    fn pick_twine(&mut self, graph: &Graph, e: usize, shape: Option<[f32; 4]>) {
+        let (bins, places) = (self.profiles.bins, 2 * self.steps + 1);
+        let (edge, step, kernel) = (&graph.edges[e], self.profiles.step_px as f32, &self.kernel_of_edge[e]);
+        let (sign, reach) = (self.signs[graph.blocks.of_edge(e)], self.reaches[e]);
+        let inverse = 1.0 / (0.6 * reach + 0.3).powi(2);
+        for bin in 0..bins {
+            let along = self.profiles.along[bin];
+            let [bow, s_bend] = bend(along);
+            // The profile's middle lies on the line as it was when it was sampled.
+            let bent = bow * edge.bow[0] + s_bend * edge.bow[1];
+            let believed =
+                shape.map_or(0.0, |s| s[0] * (1.0 - along) + s[1] * along + s[2] * bow + s[3] * s_bend - bent);
+            let row = &self.responses[(e * bins + bin) * places..][..places];
+            let middle = believed / step + self.steps as f32;
+            let last = (places - 1) as f32;
+            let low = (middle - reach / step).ceil().clamp(0.0, last);
+            let high = (middle + reach / step).floor().clamp(0.0, last);
+            for (k, (near, amplitude)) in self.near.iter_mut().zip(row).enumerate() {
+                let q = (k as f32 - middle) * step;
+                // A bell without an exponential.
+                let bell = 1.0 / (1.0 + 0.25 * q * q * inverse);
+                *near = amplitude * sign * bell * bell;
+            }
+            let (mut at, mut most) = (0, 0.0_f32);
+            for (k, &near) in self.near.iter().enumerate().take(high as usize + 1).skip(low as usize) {
+                (at, most) = if near > most { (k, near) } else { (at, most) };
+            }
+            let k = at.clamp(1, places - 2);
+            let part = vertex([k - 1, k, k + 1].map(|k| row[k] * sign));
+            let q = (k as f32 - self.steps as f32 + part) * step;
+            self.offsets.push(q + bent);
+            let good = most > 0.0 && self.profiles.inside[e * bins + bin] && (q - believed).abs() < 0.98 * reach;
+            let amplitude = row[at].abs();
+            self.picked.push(if good { amplitude } else { f32::NAN });
+            // The squared sum that the template leaves, for now.
+            let rest = if good {
+                let first = at + self.profiles.half - self.steps - kernel.half();
+                let rest = self.kernels.rest(kernel, self.profiles.from(e, bin, first)) - kernel.gain(amplitude);
+                (rest.max(1e-6) * step / REST_PX).sqrt()
+            } else {
+                f32::NAN
+            };
+            self.weights.push(rest);
+        }
     }
 
     /// How much each bin is believed: amplitude over what the template leaves, nothing where the amplitude is not the neighbours'.
@@ -278,8 +292,7 @@ impl Locator {
         self.amplitudes.clear();
         for e in 0..graph.edges.len() {
             self.scratch.clear();
-            let of_edge = self.picked[e * bins..(e + 1) * bins].iter().map(|p| p.1);
-            self.scratch.extend(of_edge.filter(|a| !a.is_nan()));
+            self.scratch.extend(self.picked[e * bins..(e + 1) * bins].iter().filter(|a| !a.is_nan()));
             self.amplitudes.push(median(&mut self.scratch).unwrap_or(f32::NAN));
         }
         graph.blocks.local_median(&self.amplitudes, &mut self.typical);
@@ -287,11 +300,20 @@ impl Locator {
         self.scratch.extend(self.amplitudes.iter().filter(|a| !a.is_nan()));
         let least = LEAST_NOISE * upper(&mut self.scratch).unwrap_or(0.0) + 1e-6;
         for (k, weight) in self.weights.iter_mut().enumerate() {
-            let amplitude = self.picked[k].1;
+            let amplitude = self.picked[k];
             let part = amplitude / self.typical[graph.blocks.of_edge(k / bins)];
             // False for NaN.
             let alike = part > AMPLITUDE_PARTS.0 && part < AMPLITUDE_PARTS.1;
             *weight = if alike { (amplitude / weight.max(least)).powi(2).min(WEIGHT_MAX) } else { 0.0 };
+        }
+    }
+}
+
+widely! {
+    /// Picks all twines.
+    fn pick_all<'a>(locator: &'a mut Locator, graph: &'a Graph, solver: Option<&'a Solver>) -> () {
+        for e in 0..graph.edges.len() {
+            locator.pick_twine(graph, e, solver.map(|s| s.shape(graph, e)));
         }
     }
 }
@@ -328,7 +350,7 @@ pub(crate) fn sign(amplitudes: &[f32], reach: f32) -> f32 {
 /// Where three successive positive values have their maximum, in steps from the middle: that of a bell through them, or of a parabola.
 pub(crate) fn vertex([l, c, r]: [f32; 3]) -> f32 {
     let least = 0.05 * c;
-    let [l, c, r] = if l > least && r > least { [l.ln(), c.ln(), r.ln()] } else { [l, c, r] };
-    let curvature = l - 2.0 * c + r;
-    if curvature < -1e-9 { (0.5 * (l - r) / curvature).clamp(-0.6, 0.6) } else { 0.0 }
+    let (across, curvature) =
+        if l > least && r > least { ((l / r).ln(), (l * r / (c * c)).ln()) } else { (l - r, l - 2.0 * c + r) };
+    if curvature < -1e-9 { (0.5 * across / curvature).clamp(-0.6, 0.6) } else { 0.0 }
 }

@@ -8,6 +8,7 @@ mod covered;
 mod foreign;
 mod graph;
 mod grow;
+mod lanes;
 mod lines;
 mod locate;
 mod map;

@@ -71,7 +71,10 @@ pub(crate) struct Presence {
     control_means: Means,
     twine: Lines,
     control: Lines,
+    structures: Vec<f32>,
     control_structure: Vec<f32>,
+    /// By edge: mean grey levels of control lines.
+    levels: Vec<f32>,
     scratch: Vec<f32>,
     covered: Covered,
     foreign: Foreign,
@@ -106,7 +109,19 @@ impl Presence {
         self.control_means.take(&self.control_profiles, half);
         self.control.reduce(graph, &self.control_profiles, &self.control_means, &self.appearance);
         self.covered.find(graph, image);
-        self.foreign.find(graph, &self.twine.level, &self.control.level);
+        self.structures.clear();
+        self.levels.clear();
+        for e in 0..graph.edges.len() {
+            let inside = self.control_means.inside[e];
+            let (structure, level) = if inside {
+                (self.control.structure(e, &self.control_profiles), self.control.level(e, &self.control_profiles))
+            } else {
+                (f32::NAN, f32::NAN)
+            };
+            self.structures.push(structure);
+            self.levels.push(level);
+        }
+        self.foreign.find(graph, &self.levels);
         self.decide(graph, profiles, config);
         self.outside.mark(graph, &mut self.twines);
     }
@@ -133,7 +148,11 @@ impl Presence {
             self.twine.whole.borrow(graph, &mut self.scratch);
             self.twine.weakest.borrow(graph, &mut self.scratch);
         }
-        graph.blocks.local_median(&self.control.structure, &mut self.control_structure);
+        for lines in [&mut self.twine, &mut self.control] {
+            lines.whole.finish();
+            lines.weakest.finish();
+        }
+        graph.blocks.local_median(&self.structures, &mut self.control_structure);
         self.twines.clear();
         self.votes.clear();
         self.ambiguous.clear();
@@ -142,10 +161,7 @@ impl Presence {
             let block = graph.blocks.of_edge(e);
             let (weak_llr, contrast) = evidence(&self.twine.weakest, &self.control.weakest, e, block);
             let (whole_llr, whole_contrast) = evidence(&self.twine.whole, &self.control.whole, e, block);
-            let (covered, near) = self.covered.at(graph, edge);
-            let clutter = self.twine.structure[e] / (self.control_structure[block] + 1e-6);
-            let height = graph.nodes[edge.nodes[0] as usize].height as f32;
-            let too_much = CLUTTER * (height / CLUTTER_CELL_PX).max(1.0);
+            let covered = self.covered.beside(graph, edge);
             let known = !self.twine.weakest.values[e].is_nan() && self.appearance.centred[block];
             let told = known && f64::from(contrast) > config.gate;
             let told_whole = known && f64::from(whole_contrast) > config.gate;
@@ -161,26 +177,49 @@ impl Presence {
                 l if l > 0.0 && told && covered <= HIDDEN => TwineState::Unknown,
                 _ if !told && covered <= HIDDEN => TwineState::Unknown,
                 _ if covered > HIDDEN => TwineState::Hidden,
-                l if l < config.missing_llr && clutter > too_much => TwineState::Fouled,
-                // In a gap one sees what lies beside it.
-                l if l < config.missing_llr && self.foreign.at(e) > FOREIGN => TwineState::Fouled,
-                // What hides a mesh may hide a twine at its corner.
-                l if l < config.missing_llr && near > HIDDEN => TwineState::Hidden,
-                l if l < config.missing_llr => TwineState::Missing,
+                l if l < config.missing_llr => self.look_again(graph, profiles, e),
                 _ => TwineState::Unknown,
             };
             // A twine that lies elsewhere within reach is not gone; where it runs is not known either.
+            let height = graph.nodes[edge.nodes[0] as usize].height as f32;
             let astray = state == TwineState::Missing
                 && self.twine.elsewhere(e, self.appearance.template(block), profiles, height)
                     > ASTRAY * self.twine.weakest.typical(block);
             let (state, llr) = if astray { (TwineState::Unknown, 0.0) } else { (state, llr) };
-            let part = self.twine.strongest[e] / self.twine.weakest.typical(block);
-            self.ambiguous.push(part > TUFT.0 && self.foreign.at(e) > TUFT.1);
+            self.ambiguous.push(
+                state == TwineState::Missing && {
+                    let part = self.twine.strongest[e] / self.twine.weakest.typical(block);
+                    part > TUFT.0 && self.foreign_at(graph, profiles, e) > TUFT.1
+                },
+            );
             // None for what is outside the picture.
             let contrast = if self.appearance.means.inside[e] { contrast.max(whole_contrast) } else { 0.0 };
             let vote = if known { vote(&self.twine.full, &self.control.full, e, block) } else { 0.0 };
             self.votes.push(if self.appearance.means.inside[e] { vote } else { f32::NAN });
             self.twines.push(Twine { index, direction: edge.family, state, llr, contrast });
         }
+    }
+
+    /// What hides a twine that looks missing, if anything does.
+    fn look_again(&mut self, graph: &Graph, profiles: &Profiles, e: usize) -> TwineState {
+        let edge = &graph.edges[e];
+        let height = graph.nodes[edge.nodes[0] as usize].height as f32;
+        let too_much = CLUTTER * (height / CLUTTER_CELL_PX).max(1.0);
+        let structure = self.control_structure[graph.blocks.of_edge(e)] + 1e-6;
+        if self.twine.structure(e, profiles) > too_much * structure
+            // In a gap one sees what lies beside it.
+            || self.foreign_at(graph, profiles, e) > FOREIGN
+        {
+            TwineState::Fouled
+        } else if self.covered.at_ends(graph, edge) > HIDDEN {
+            // What hides a mesh may hide a twine at its corner.
+            TwineState::Hidden
+        } else {
+            TwineState::Missing
+        }
+    }
+
+    fn foreign_at(&self, graph: &Graph, profiles: &Profiles, e: usize) -> f32 {
+        self.foreign.of(graph, e, self.twine.level(e, profiles), &self.levels)
     }
 }

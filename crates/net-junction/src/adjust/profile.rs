@@ -1,6 +1,7 @@
 //! Grey values across twines: what lies at each distance from the line that a twine is believed to follow.
 
 use crate::adjust::graph::{Edge, Graph, median};
+use crate::adjust::lanes::LANES;
 use crate::adjust::source::{END, Source};
 
 /// Distance between neighbouring values across the twine, px: to find it, in small cells, and to measure it.
@@ -57,6 +58,12 @@ impl Profiles {
         &self.values[(edge * self.bins + bin) * self.width()..][..self.width()]
     }
 
+    /// What is kept from a value of one bin's profile on: at least a whole vector beyond its end.
+    #[inline(always)]
+    pub fn from(&self, edge: usize, bin: usize, value: usize) -> &[f32] {
+        &self.values[(edge * self.bins + bin) * self.width() + value..]
+    }
+
     /// Samples `half` steps of `step_px` to each side of every twine, bent as it is believed to be. With `aside` the lines half a cell beside
     /// the twines, through the middles of the meshes: what profiles look like where there is no twine.
     ///
@@ -82,7 +89,7 @@ impl Profiles {
         self.along.extend((0..self.bins).map(|b| END + share * (b as f32 + 0.5)));
         let width = self.width();
         // What is not sampled is not read.
-        self.values.resize(graph.edges.len() * self.bins * width, 0.0);
+        self.values.resize(graph.edges.len() * self.bins * width + LANES, 0.0);
         self.inside.clear();
         self.inside.resize(graph.edges.len() * self.bins, true);
         for (e, edge) in graph.edges.iter().enumerate().step_by(stride) {

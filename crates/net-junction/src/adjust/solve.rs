@@ -5,6 +5,7 @@
 //! the last one's solution.
 
 use net_geometry::nalgebra::{Matrix2, Vector2};
+use net_image::widely;
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, bend, median};
@@ -86,6 +87,26 @@ pub(crate) struct Solver {
     scale: f32,
 }
 
+widely! {
+    /// Solves and reweighs.
+    fn run<'a>(
+        solver: &'a mut Solver,
+        graph: &'a Graph,
+        measured: (&'a [f32], &'a [f32]),
+        rounds: usize,
+    ) -> () {
+        let (offsets, weights) = measured;
+        for round in 0..rounds {
+            solver.assemble(graph, offsets);
+            let last = round + 1 == rounds;
+            solver.conjugate_gradients(graph, STEPS_MAX[usize::from(last)]);
+            if !last {
+                solver.reweigh(graph, offsets, weights);
+            }
+        }
+    }
+}
+
 impl Solver {
     /// Takes nodes and twines where they are now believed to be as the place from which displacements count.
     pub fn start(&mut self, graph: &Graph, along: &[f32], config: &AdjustConfig) {
@@ -128,14 +149,7 @@ impl Solver {
     pub fn solve(&mut self, graph: &Graph, offsets: &[f32], weights: &[f32], rounds: usize) {
         self.weights.clear();
         self.weights.extend_from_slice(weights);
-        for round in 0..rounds {
-            self.assemble(graph, offsets);
-            let last = round + 1 == rounds;
-            self.conjugate_gradients(graph, STEPS_MAX[usize::from(last)]);
-            if !last {
-                self.reweigh(graph, offsets, weights);
-            }
-        }
+        run(self, graph, (offsets, weights), rounds);
     }
 
     /// Moves nodes and bends twines as was found.
@@ -149,21 +163,23 @@ impl Solver {
         }
     }
 
-    /// How far, px, the twine now lies off its chord as it was at the start, at `along` from 0 to 1.
-    pub fn offset(&self, graph: &Graph, edge: usize, along: f32) -> f32 {
+    /// How far, px, the twine's ends now lie off its chord as it was at the start, its bow and its S-bend.
+    #[inline(always)]
+    pub fn shape(&self, graph: &Graph, edge: usize) -> [f32; 4] {
         let ends = self.ends(graph, edge);
         let bends = self.twines[edge].bends(ends);
-        let [bow, s_bend] = bend(along);
-        ends.x * (1.0 - along) + ends.y * along + bow * bends.x + s_bend * bends.y
+        [ends.x, ends.y, bends.x, bends.y]
     }
 
     /// Displacement of a twine's ends across it.
+    #[inline(always)]
     fn ends(&self, graph: &Graph, edge: usize) -> V2 {
         let [a, b] = graph.edges[edge].nodes.map(|n| self.step[n as usize]);
         let normal = self.frames[edge].normal;
         V2::new(normal.dot(&a), normal.dot(&b))
     }
 
+    #[inline(always)]
     fn assemble(&mut self, graph: &Graph, offsets: &[f32]) {
         let nodes = graph.nodes.len();
         self.twines.clear();
@@ -212,6 +228,7 @@ impl Solver {
     }
 
     /// `product = A direction`.
+    #[inline(always)]
     fn multiply(&mut self, graph: &Graph) {
         for ((p, d), prior) in self.product.iter_mut().zip(&self.direction).zip(&self.prior) {
             *p = d * *prior;
@@ -226,6 +243,7 @@ impl Solver {
         }
     }
 
+    #[inline(always)]
     fn conjugate_gradients(&mut self, graph: &Graph, most: usize) {
         let nodes = graph.nodes.len();
         let dot = |a: &[V2], b: &[V2]| a.iter().zip(b).map(|(x, y)| x.dot(y)).sum::<f32>();
@@ -265,13 +283,12 @@ impl Solver {
         }
     }
 
+    #[inline(always)]
     fn reweigh(&mut self, graph: &Graph, offsets: &[f32], weights: &[f32]) {
         let bins = self.coefficients.len();
         // Weights hold the residuals for a moment.
         for e in 0..self.twines.len() {
-            let ends = self.ends(graph, e);
-            let bends = self.twines[e].bends(ends);
-            let [x, y, bow, s_bend] = [ends.x, ends.y, bends.x, bends.y];
+            let [x, y, bow, s_bend] = self.shape(graph, e);
             let of_edge = e * bins..(e + 1) * bins;
             for ((w, o), c) in self.weights[of_edge.clone()].iter_mut().zip(&offsets[of_edge]).zip(&self.coefficients) {
                 *w = o - (c[0] * x + c[1] * y + c[2] * bow + c[3] * s_bend);
@@ -290,6 +307,7 @@ impl Solver {
 }
 
 impl Twine {
+    #[inline(always)]
     fn bends(&self, ends: V2) -> V2 {
         self.bend_right - self.bend_by_end * ends
     }

@@ -5,6 +5,7 @@ use net_image::{GrayView, Image};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::adjust::graph::bend;
+use crate::adjust::lanes::LANES;
 
 /// Part of a twine at each end that is left to the knots.
 pub(crate) const END: f32 = 0.03;
@@ -16,8 +17,8 @@ const ONE: f32 = 65536.0;
 /// of each leaves out too many pixels where light is low.
 const SAMPLES_MIN: f32 = 2.0;
 const SAMPLES_MAX: f32 = 16.0;
-/// Profiles are sampled in whole vectors of so many values.
-const LANES: usize = 8;
+/// Values beyond whole vectors that are sampled one by one: a whole vector more takes as long.
+const FEW: usize = 3;
 
 /// A picture, ready for bilinear samples, and the same at half and a quarter of its size.
 #[derive(Debug, Default)]
@@ -147,11 +148,16 @@ impl Level {
         for (first, out) in (0..).step_by(LANES).zip(whole) {
             self.add_vector(&place, first, out);
         }
-        if !rest.is_empty() {
-            let mut last = [0; LANES];
-            self.add_vector(&place, end, &mut last);
-            rest.iter_mut().zip(last).for_each(|(out, value)| *out += value);
+        for (k, out) in (end..).zip(rest) {
+            self.add_one(place(k), out);
         }
+    }
+
+    #[inline(always)]
+    fn add_one(&self, [x, y]: [i32; 2], out: &mut i32) {
+        let at = (y >> 16).wrapping_mul(self.squares.width() as i32).wrapping_add(x >> 16);
+        let square = self.squares.data().get(at as u32 as usize).copied().unwrap_or(0);
+        *out += within(square, (x >> 8) & 0xff, (y >> 8) & 0xff);
     }
 
     /// The same of as many as a vector holds, from the `first` place on.
@@ -163,14 +169,14 @@ impl Level {
         let (mut found, mut part) = ([0; LANES], [[0; LANES]; 2]);
         for k in 0..LANES {
             let [x, y] = place(first + k as i32);
-            found[k] = (y >> 16).wrapping_mul(width).wrapping_add(x >> 16);
+            found[k] = ((y >> 16).wrapping_mul(width).wrapping_add(x >> 16) as u32).min(last as u32);
             (part[0][k], part[1][k]) = ((x >> 8) & 0xff, (y >> 8) & 0xff);
         }
         for at in &mut found {
-            *at = squares[(*at as usize).min(last)] as i32;
+            *at = squares[(*at as usize).min(last)];
         }
         for k in 0..LANES {
-            out[k] += within(found[k] as u32, part[0][k], part[1][k]);
+            out[k] += within(found[k], part[0][k], part[1][k]);
         }
     }
 }
@@ -215,7 +221,7 @@ impl WithSimd for Across<'_> {
         let back = step * (width / 2) as f32;
         let weight = 1.0 / samples as f32;
         let unit = weight / ONE;
-        let padded = width.next_multiple_of(LANES);
+        let padded = if width % LANES > FEW { width.next_multiple_of(LANES) } else { width };
         let whole_step = [step.x, step.y].map(|at| (at * ONE) as i32);
         // Bends take the line no farther than this.
         let bent = normal * (bow[0].abs() + bow[1].abs()) + step * (padded - width) as f32;

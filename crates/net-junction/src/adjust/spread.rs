@@ -195,10 +195,14 @@ impl Spreader {
     fn begin(&mut self, graph: &Graph, seen: &impl Fn(usize) -> bool, strong: &impl Fn(usize) -> bool) {
         let Some(seed) = graph.nodes.first().map(|n| n.predicted) else { return };
         let distance = |n: usize| (graph.nodes[n].predicted - seed).norm_squared();
-        let start = (0..graph.nodes.len())
-            .filter(|&n| seen(n) && self.alike(graph, n, seen).count() >= FEWEST)
-            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        let Some(start) = start else { return };
+        let mut start = None;
+        for n in (0..graph.nodes.len()).filter(|&n| seen(n)) {
+            let away = distance(n);
+            if start.is_none_or(|(_, least)| away < least) && self.alike(graph, n, seen).count() >= FEWEST {
+                start = Some((n, away));
+            }
+        }
+        let Some((start, _)) = start else { return };
         self.found.clear();
         let mut found = std::mem::take(&mut self.found);
         found.extend(self.alike(graph, start, seen).map(|k| (k as u32, Vector2::zeros())));

@@ -13,6 +13,8 @@ pub(crate) struct Statistic {
     pub values: Vec<f32>,
     typical: Vec<f32>,
     spread: Vec<f32>,
+    /// Logarithms of `spread`.
+    log_spread: Vec<f32>,
 }
 
 impl Statistic {
@@ -28,6 +30,12 @@ impl Statistic {
         for s in &mut self.spread {
             *s = (1.4826 * (0.5 * (*s * *s + overall * overall)).sqrt()).hypot(floor);
         }
+    }
+
+    /// Readies [`evidence`], once typical values and scatter are what they stay.
+    pub fn finish(&mut self) {
+        self.log_spread.clear();
+        self.log_spread.extend(self.spread.iter().map(|s| s.ln()));
     }
 
     /// What is usual around a block.
@@ -50,13 +58,15 @@ impl Statistic {
     }
 }
 
-/// Log likelihood ratio, twine to no twine, of an edge's statistic, and by how many standard deviations its neighbourhood's differ.
+/// Log likelihood ratio, twine to no twine, of an edge's statistic by Student densities with five degrees of freedom, and by how many standard deviations its neighbourhood's differ.
 pub(crate) fn evidence(twine: &Statistic, control: &Statistic, edge: usize, block: usize) -> (f32, f32) {
     let (p0, sp) = (twine.typical[block], twine.spread[block]);
     let (m0, s0) = (control.typical[block], control.spread[block]);
     // Stronger than usual twine is no less twine; weaker than no twine is no less missing.
     let x = twine.values[edge].min(p0).max(m0);
-    (log_student(x, p0, sp) - log_student(x, m0, s0), (p0 - m0) / sp.hypot(s0))
+    let [present, missing] = [(p0, sp), (m0, s0)].map(|(at, scale)| 1.0 + ((x - at) / scale).powi(2) / 5.0);
+    let llr = control.log_spread[block] - twine.log_spread[block] + 3.0 * (missing / present).ln();
+    (llr, (p0 - m0) / sp.hypot(s0))
 }
 
 /// Log likelihood ratio, twine to no twine, of normal densities of the same scatter, limited to [`VOTE_MAX`]: a sum of many needs no heavy tails.
@@ -65,9 +75,4 @@ pub(crate) fn vote(twine: &Statistic, control: &Statistic, edge: usize, block: u
     let variance = 0.5 * (twine.spread[block].powi(2) + control.spread[block].powi(2));
     let x = twine.values[edge] - 0.5 * (p0 + m0);
     (x * (p0 - m0).max(0.0) / variance).clamp(-VOTE_MAX, VOTE_MAX)
-}
-
-/// Logarithm of Student's density with five degrees of freedom, up to a constant.
-fn log_student(x: f32, location: f32, scale: f32) -> f32 {
-    -scale.ln() - 3.0 * (((x - location) / scale).powi(2) / 5.0).ln_1p()
 }

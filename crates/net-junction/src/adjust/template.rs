@@ -2,8 +2,8 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Values that are filtered at once.
-const LANES: usize = 8;
+use crate::adjust::lanes::{Detrend, LANES};
+
 /// Ratio of widths of neighbouring classes is `e` to this.
 const CLASS: f64 = 0.15;
 
@@ -37,8 +37,6 @@ pub(crate) struct Kernel {
     start: usize,
     /// Sum of squares.
     energy: f32,
-    /// Sum of squared distances, steps².
-    second: f32,
 }
 
 impl Kernel {
@@ -70,13 +68,15 @@ pub(crate) struct Kernels {
     kernels: Vec<Kernel>,
     /// The kernels' values over their energies: their products with a profile are amplitudes.
     taps: Vec<f32>,
+    /// By half length of the kernel.
+    detrends: Vec<Detrend>,
     step_px: f64,
     arch: Arch,
 }
 
 impl Default for Kernels {
     fn default() -> Self {
-        Self { kernels: Vec::new(), taps: Vec::new(), step_px: 1.0, arch: Arch::new() }
+        Self { kernels: Vec::new(), taps: Vec::new(), detrends: Vec::new(), step_px: 1.0, arch: Arch::new() }
     }
 }
 
@@ -118,8 +118,11 @@ impl Kernels {
         self.taps.extend((-half..=half).map(|k| (profile(k) - mean) as f32));
         let energy = self.taps[start..].iter().map(|t| t * t).sum::<f32>().max(1e-12);
         self.taps[start..].iter_mut().for_each(|t| *t /= energy);
-        let second = (-half..=half).map(|k| (k * k) as f32).sum();
-        let kernel = Kernel { class, start, energy, second };
+        if self.detrends.len() <= class.2 {
+            let made = self.detrends.len();
+            self.detrends.extend((made..=class.2).map(Detrend::new));
+        }
+        let kernel = Kernel { class, start, energy };
         self.kernels.push(kernel);
         kernel
     }
@@ -138,14 +141,13 @@ impl Kernels {
     pub fn match_at(&self, kernel: &Kernel, profile: &[f32], at: usize) -> Match {
         let part = &profile[at - kernel.half()..][..2 * kernel.half() + 1];
         let amplitude = self.taps(kernel).iter().zip(part).map(|(t, p)| t * p).sum::<f32>();
-        Match { amplitude, gain: kernel.gain(amplitude), rest: self.rest(kernel, profile, at) }
+        Match { amplitude, gain: kernel.gain(amplitude), rest: self.rest(kernel, &profile[at - kernel.half()..]) }
     }
 
-    /// Sum of squares that constant and slope leave of a profile within the kernel's reach of value `at`.
-    pub fn rest(&self, kernel: &Kernel, profile: &[f32], at: usize) -> f32 {
-        let part = &profile[at - kernel.half()..][..2 * kernel.half() + 1];
-        let Moments { sum, squares, slope } = self.arch.dispatch(Reduce { part, half: kernel.half() });
-        (squares - sum * sum / part.len() as f32 - slope * slope / kernel.second).max(0.0)
+    /// Sum of squares that constant and slope leave of the first values of a profile, as many as the kernel has.
+    #[inline(always)]
+    pub fn rest(&self, kernel: &Kernel, profile: &[f32]) -> f32 {
+        self.detrends[kernel.half()].rest(profile)
     }
 }
 
@@ -178,46 +180,6 @@ impl WithSimd for Filter<'_> {
                 *o = taps.iter().zip(part).map(|(t, p)| t * p).sum();
             }
         }
-    }
-}
-
-/// Sums over part of a profile, about its middle value, so that squares of large grey levels do not cancel.
-struct Moments {
-    sum: f32,
-    squares: f32,
-    /// With the distance from the middle.
-    slope: f32,
-}
-
-/// Part of a profile of which the moments are wanted.
-struct Reduce<'a> {
-    part: &'a [f32],
-    half: usize,
-}
-
-impl WithSimd for Reduce<'_> {
-    type Output = Moments;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Moments {
-        let Self { part, half } = self;
-        let base = part[half];
-        let (vectors, left) = part.as_chunks::<LANES>();
-        let (mut sum, mut squares, mut slope) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
-        let mut add = |first: usize, values: [f32; LANES]| {
-            let first = first as f32 - half as f32;
-            sum.iter_mut().zip(values).for_each(|(s, p)| *s += p);
-            squares.iter_mut().zip(values).for_each(|(s, p)| *s += p * p);
-            slope.iter_mut().zip(values).enumerate().for_each(|(k, (s, p))| *s += (first + k as f32) * p);
-        };
-        for (n, values) in vectors.iter().enumerate() {
-            add(n * LANES, values.map(|p| p - base));
-        }
-        let mut last = [0.0; LANES];
-        last.iter_mut().zip(left).for_each(|(l, p)| *l = p - base);
-        add(vectors.len() * LANES, last);
-        let [sum, squares, slope] = [sum, squares, slope].map(|lanes| lanes.iter().sum());
-        Moments { sum, squares, slope }
     }
 }
 
