@@ -45,8 +45,8 @@ impl Default for AdjustConfig {
             bow: 0.012,
             present_llr: 3.0,
             missing_llr: -1.5,
-            hole_one_llr: -5.0,
-            certain_contrast: 4.5,
+            hole_one_llr: -4.0,
+            certain_contrast: 4.0,
             hole_sum_llr: -13.0,
             gate: 1.5,
         }

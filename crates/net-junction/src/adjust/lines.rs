@@ -65,14 +65,12 @@ impl Means {
     }
 }
 
-/// Per edge: amplitude with its knots, over the whole of it between them, and the smallest and largest over half of it.
+/// Per edge: amplitude with its knots, over the whole of it between them, and the smallest over half of it.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     pub full: Statistic,
     pub whole: Statistic,
     pub weakest: Statistic,
-    /// The largest amplitude over half of it.
-    pub strongest: Vec<f32>,
     /// First bin of the weakest half.
     weakest_from: Vec<u32>,
     /// By edge and bin: amplitudes.
@@ -92,7 +90,7 @@ widely! {
         means: &'a Means,
         appearance: &'a Appearance,
     ) -> () {
-        let Lines { full, whole, weakest, strongest, weakest_from, amplitudes, middle, .. } = lines;
+        let Lines { full, whole, weakest, weakest_from, amplitudes, middle, .. } = lines;
         let (bins, window) = (profiles.bins, middle.len().div_ceil(2));
         let first = profiles.half - appearance.half - SHIFT;
         for e in (0..graph.edges.len()).filter(|&e| means.inside[e]) {
@@ -105,14 +103,12 @@ widely! {
             }
             full.values[e] = row.iter().sum::<f32>() / bins as f32;
             // The weakest half: a broken twine leaves stubs.
-            let (mut least, mut most) = ((0, f32::MAX), f32::MIN);
+            let mut least = (0, f32::MAX);
             for (from, half) in row[middle.clone()].windows(window).enumerate() {
                 let sum = half.iter().sum::<f32>();
                 least = if sum < least.1 { (from, sum) } else { least };
-                most = most.max(sum);
             }
             weakest.values[e] = least.1 / window as f32;
-            strongest[e] = most / window as f32;
             weakest_from[e] = (middle.start + least.0) as u32;
         }
     }
@@ -122,7 +118,7 @@ impl Lines {
     /// Measures all lines.
     pub fn reduce(&mut self, graph: &Graph, profiles: &Profiles, means: &Means, appearance: &Appearance) {
         let edges = graph.edges.len();
-        for values in [&mut self.full.values, &mut self.whole.values, &mut self.weakest.values, &mut self.strongest] {
+        for values in [&mut self.full.values, &mut self.whole.values, &mut self.weakest.values] {
             values.clear();
             values.resize(edges, f32::NAN);
         }
@@ -158,6 +154,12 @@ impl Lines {
         let gone = amplitudes.map(|half| half.iter().sum::<f32>() / window as f32 <= most);
         let of_halves = self.structures.windows(window).zip(gone).filter(|(_, gone)| *gone);
         of_halves.map(|(half, _)| half.iter().sum::<f32>()).fold(f32::MAX, f32::min) / window as f32
+    }
+
+    /// The largest amplitude of a bin between the knots, in parts of the template's.
+    pub fn left(&self, e: usize, profiles: &Profiles) -> f32 {
+        let bins = &self.amplitudes[e * profiles.bins..][..profiles.bins];
+        bins[self.middle.clone()].iter().copied().fold(f32::MIN, f32::max)
     }
 
     /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.

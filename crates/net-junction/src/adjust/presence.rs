@@ -22,8 +22,9 @@ const CLUTTER: f32 = 1.5;
 /// A weak twine whose level is this many deviations off that of the meshes beside it is overgrown: in a gap one sees the same water. Drawn
 /// nets lose no broken twine by it, compared with 4.
 const FOREIGN: f32 = 2.5;
-/// A weak twine with this part of the usual amplitude on its other half, and this many deviations off the meshes beside it, may be twine under a tuft: doubtful at best.
-const TUFT: (f32, f32) = (0.4, 1.5);
+/// A gap has nothing of the usual amplitude left, in any bin between the knots, and its place is no more deviations off the meshes beside it. Flakes and tufts are
+/// smaller than meshes, and of other brightness than water.
+const GAP: (f32, f32) = (0.6, 1.2);
 /// Part of the usual amplitude that a weak half must have somewhere beside the line to be that of a twine which the line has missed. In cells of
 /// 10 px and more that are drawn with broken twines, 99 in a hundred of these have less than a third.
 const ASTRAY: f32 = 0.5;
@@ -79,8 +80,8 @@ pub(crate) struct Presence {
     covered: Covered,
     foreign: Foreign,
     outside: Outside,
-    /// By edge: whether something else than a gap may look so.
-    ambiguous: Vec<bool>,
+    /// By edge: whether it looks missing, and nothing of it is left nor anything else there.
+    gaps: Vec<bool>,
     /// By edge: log likelihood ratio, net to no net, of the whole twine by normal densities, limited; NaN outside the picture.
     pub votes: Vec<f32>,
     /// The twines, in the graph's order.
@@ -128,7 +129,7 @@ impl Presence {
 
     /// What looks gone is gone where it is certain.
     pub fn claim(&mut self, graph: &Graph, seen: impl Fn(usize) -> bool, config: &AdjustConfig) {
-        self.outside.claim(graph, &mut self.twines, &self.ambiguous, seen, config);
+        self.outside.claim(graph, &mut self.twines, &self.gaps, seen, config);
     }
 
     fn decide(&mut self, graph: &mut Graph, profiles: &Profiles, config: &AdjustConfig) {
@@ -155,7 +156,7 @@ impl Presence {
         graph.blocks.local_median(&self.structures, &mut self.control_structure);
         self.twines.clear();
         self.votes.clear();
-        self.ambiguous.clear();
+        self.gaps.clear();
         for (e, edge) in graph.edges.iter().enumerate() {
             let index = graph.nodes[edge.nodes[0] as usize].index;
             let block = graph.blocks.of_edge(e);
@@ -186,11 +187,10 @@ impl Presence {
                 && self.twine.elsewhere(e, self.appearance.template(block), profiles, height)
                     > ASTRAY * self.twine.weakest.typical(block);
             let (state, llr) = if astray { (TwineState::Unknown, 0.0) } else { (state, llr) };
-            self.ambiguous.push(
-                state == TwineState::Missing && {
-                    let part = self.twine.strongest[e] / self.twine.weakest.typical(block);
-                    part > TUFT.0 && self.foreign_at(graph, profiles, e) > TUFT.1
-                },
+            self.gaps.push(
+                state == TwineState::Missing
+                    && self.twine.left(e, profiles) < GAP.0 * self.twine.weakest.typical(block)
+                    && self.foreign_at(graph, profiles, e) < GAP.1,
             );
             // None for what is outside the picture.
             let contrast = if self.appearance.means.inside[e] { contrast.max(whole_contrast) } else { 0.0 };
