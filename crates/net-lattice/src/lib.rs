@@ -3,10 +3,10 @@
 //!
 //! # Stages, one file each, in the order data flows
 //! 1. `view`: the picture averaged down to a pyramid, the rays through its grid, the tiles that gather evidence.
-//! 2. `spectra`: whitened power spectra of overlapping tiles.
+//! 2. `spectra`, `coarse`: whitened power spectra of overlapping tiles.
 //! 3. `search`, `score`, `refine`: which planes, turns, depths and crossing angles put both families' harmonics on power in *all* tiles. A single spectrum cannot
 //!    tell the sign of a tilt; the change of the wave vectors from tile to tile does. `background`: what hypotheses score that are not there.
-//! 4. `surface`, `map`: the sheet, and the lattice coordinates it gives every pixel (rays, so any lens).
+//! 4. `surface`, `chart`, `map`: the sheet, and the lattice coordinates it gives every pixel (rays, so any lens).
 //! 5. `seed`, `demodulate`, `comb`, `lockin`, `fit`: the picture demodulated along the predicted waves; Gauss-Newton on the phases left over, in a window that grows.
 //! 6. `template`, `likelihood`: the twine drawn as it should look; how much better that explains the picture, and how each tile would move it.
 //!    Used to tell bright twine from dark, the true cell from rival periods, and for the last digits.
@@ -44,6 +44,8 @@
 
 mod alike;
 mod background;
+mod chart;
+mod coarse;
 mod cold;
 mod comb;
 mod conclude;

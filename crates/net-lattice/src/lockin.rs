@@ -1,9 +1,10 @@
 //! Lock-in: what phase is left over of the demodulated picture says where the lattice really is.
 
+use crate::chart::Point;
 use crate::comb::Comb;
 use crate::demodulate::TileSum;
 use crate::numeric::quantile;
-use crate::surface::{Point, Surface};
+use crate::surface::Surface;
 use crate::view::{Site, View};
 
 /// What a tile says about the lattice.

@@ -1,7 +1,8 @@
 //! Lattice coordinates over the whole picture: exact on a grid, interpolated in between.
 
+use crate::chart::Chart;
 use crate::demodulate::{LANES, Strip};
-use crate::surface::{Chart, Surface};
+use crate::surface::Surface;
 use crate::view::Level;
 
 /// Lattice coordinates at the corners of a level's blocks.

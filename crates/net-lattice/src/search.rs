@@ -7,7 +7,8 @@
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 use net_image::widely;
 
-use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE, VARIANCE};
+use crate::coarse::VARIANCE;
+use crate::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
 use crate::view::View;
 
 /// Directions of dual vectors: every 5 degrees of the half circle.
