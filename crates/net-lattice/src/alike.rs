@@ -2,6 +2,7 @@
 
 use crate::fit::{Fitter, Observation, Robust};
 use crate::surface::{PARAMETERS, Params};
+use crate::wide::widely;
 
 /// Distance over which residuals of small and of large tiles may be alike, px of an 848 x 480 px picture: three tiles.
 pub(crate) const REACH_PX: [f64; 2] = [160.0, 320.0];
@@ -10,35 +11,58 @@ pub(crate) const REACH_PX: [f64; 2] = [160.0, 320.0];
 /// find the flat model, and bent nets lose nothing by it; large ones counted so miss bends.
 pub(crate) const ALIKE: [f64; 2] = [4.0, 1.0];
 
-/// What one tile does to the parameters.
+/// Room for the parameters in whole vectors.
+const WIDE: usize = PARAMETERS.next_multiple_of(4);
+type Wide = [f64; WIDE];
+
+/// What one tile does to the parameters; zero from the first on that is not fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct Influence {
     /// Its middle, full-resolution px.
     pixel: [f64; 2],
     /// Derivatives of both coordinates by the parameters.
-    row: [Params; 2],
+    row: [Wide; 2],
     /// Change of the parameters by one cell of each coordinate.
-    by: [Params; 2],
+    by: [Wide; 2],
     /// Change of the parameters by the tile's residuals.
-    shift: Params,
+    shift: Wide,
     /// `by` summed over the tiles that are alike.
-    near: [Params; 2],
+    near: [Wide; 2],
+    /// `row` through the covariance of a field of variance 1, less `near`.
+    through: [Wide; 2],
 }
 
 /// Share of a parameter's variance that the residuals show, below which it is not raised any more.
 const LEFT: f64 = 0.1;
 
 /// The first `count` parameters from a function, the others zero.
-fn from(count: usize, of: impl Fn(usize) -> f64) -> Params {
+fn from<const N: usize>(count: usize, of: impl Fn(usize) -> f64) -> [f64; N] {
     std::array::from_fn(|k| if k < count { of(k) } else { 0.0 })
 }
 
-fn dot(count: usize, a: &Params, b: &Params) -> f64 {
-    a.iter().zip(b).take(count).map(|(a, b)| a * b).sum()
+#[inline(always)]
+fn dot(a: &Wide, b: &Wide) -> f64 {
+    let mut sums = [0.0; 4];
+    for k in (0..WIDE).step_by(4) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += a[k + lane] * b[k + lane];
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
-fn add(count: usize, sum: &mut Params, w: f64, a: &Params) {
-    sum.iter_mut().zip(a).take(count).for_each(|(s, a)| *s += w * a);
+#[inline(always)]
+fn add(sum: &mut Wide, w: f64, a: &Wide) {
+    for k in 0..WIDE {
+        sum[k] += w * a[k];
+    }
+}
+
+/// Bartlett's kernel along u and v.
+#[inline(always)]
+fn kernel(a: &Influence, b: &Influence, reach: f64) -> f64 {
+    let along = |axis: usize| (1.0 - (a.pixel[axis] - b.pixel[axis]).abs() / reach).max(0.0);
+    along(0) * along(1)
 }
 
 impl Fitter {
@@ -56,68 +80,89 @@ impl Fitter {
     ) -> [[f64; PARAMETERS]; PARAMETERS] {
         influences.clear();
         influences.reserve(observations.len());
+        let formal: [Wide; PARAMETERS] = std::array::from_fn(|a| from(count, |k| formal[a][k]));
         for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&self.jacobian) {
             if r[0].is_nan() {
                 continue;
             }
             let w = robust.weigh(o.weight, *r);
-            let score =
-                [[w[0], w[1]], [w[1], w[2]]].map(|w| -> Params { from(count, |k| w[0] * j[0][k] + w[1] * j[1][k]) });
-            let by = score.map(|s| -> Params { from(count, |k| dot(count, &formal[k], &s)) });
+            let row = j.map(|j| -> Wide { from(count, |k| j[k]) });
+            let by = [[w[0], w[1]], [w[1], w[2]]].map(|w| -> Wide {
+                let score: Wide = from(count, |k| w[0] * row[0][k] + w[1] * row[1][k]);
+                from(count, |k| dot(&formal[k], &score))
+            });
             let shift = from(count, |k| by[0][k] * r[0] + by[1][k] * r[1]);
-            influences.push(Influence { pixel: o.site.pixel, row: *j, by, shift, near: [[0.0; PARAMETERS]; 2] });
+            let none = [[0.0; WIDE]; 2];
+            influences.push(Influence { pixel: o.site.pixel, row, by, shift, near: none, through: none });
         }
-        let kernel = |a: &Influence, b: &Influence| {
-            let along = |axis: usize| (1.0 - (a.pixel[axis] - b.pixel[axis]).abs() / reach).max(0.0);
-            along(0) * along(1)
-        };
-        let mut sum = [[0.0; PARAMETERS]; PARAMETERS];
-        // What the parameters' covariance would be of a field of variance 1.
-        let mut field = [[0.0; PARAMETERS]; PARAMETERS];
+        let mut sums = Sums { by: [[0.0; WIDE]; PARAMETERS], field: [[0.0; WIDE]; PARAMETERS], left: [0.0; WIDE] };
+        sum_alike(influences, count, reach, &mut sums);
+        let Sums { by, field, left } = sums;
+        let raise: Params =
+            from(count, |k| (field[k][k] / left[k].max(LEFT * field[k][k]).max(f64::MIN_POSITIVE)).sqrt());
+        std::array::from_fn(|a| from(count, |k| by[a][k] * raise[a] * raise[k]))
+    }
+}
+
+/// Sums over all pairs of tiles that are alike.
+struct Sums {
+    /// Covariance by the residuals.
+    by: [Wide; PARAMETERS],
+    /// What the parameters' covariance would be of a field of variance 1.
+    field: [Wide; PARAMETERS],
+    /// What of its diagonal the residuals that the fit leaves would make.
+    left: Wide,
+}
+
+widely! {
+    /// Fills the sums, and what the influences lack.
+    fn sum_alike<'a>(influences: &'a mut [Influence], count: usize, reach: f64, sums: &'a mut Sums) -> () {
         for t in 0..influences.len() {
-            let (mut shift, mut near) = ([0.0; PARAMETERS], [[0.0; PARAMETERS]; 2]);
+            let (mut shift, mut near) = ([0.0; WIDE], [[0.0; WIDE]; 2]);
             for other in influences.iter() {
-                let w = kernel(&influences[t], other);
+                let w = kernel(&influences[t], other, reach);
                 if w > 0.0 {
-                    add(count, &mut shift, w, &other.shift);
-                    near.iter_mut().zip(&other.by).for_each(|(n, b)| add(count, n, w, b));
+                    add(&mut shift, w, &other.shift);
+                    (0..2).for_each(|f| add(&mut near[f], w, &other.by[f]));
                 }
             }
             let tile = &mut influences[t];
             tile.near = near;
             for a in 0..count {
-                add(count, &mut sum[a], tile.shift[a], &shift);
-                (0..2).for_each(|f| add(count, &mut field[a], tile.by[f][a], &near[f]));
+                add(&mut sums.by[a], tile.shift[a], &shift);
+                (0..2).for_each(|f| add(&mut sums.field[a], tile.by[f][a], &near[f]));
             }
         }
-        // What of it the residuals that the fit leaves would make.
-        let mut left = [0.0; PARAMETERS];
-        for one in influences.iter() {
-            let through: [Params; 2] = one.row.map(|row| from(count, |k| dot(count, &row, &field[k])));
-            for other in influences.iter() {
-                let w = kernel(one, other);
+        for tile in influences.iter_mut() {
+            for f in 0..2 {
+                let mut through = [0.0; WIDE];
+                (0..count).for_each(|a| add(&mut through, tile.row[f][a], &sums.field[a]));
+                add(&mut through, -1.0, &tile.near[f]);
+                tile.through[f] = through;
+            }
+        }
+        // Two tiles say the same of each other.
+        for (t, one) in influences.iter().enumerate() {
+            for (k, other) in influences[t..].iter().enumerate() {
+                let w = kernel(one, other, reach);
                 if w <= 0.0 {
                     continue;
                 }
+                let times = if k == 0 { w } else { 2.0 * w };
+                let mut m = [[w, 0.0], [0.0, w]];
                 for f in 0..2 {
                     for g in 0..2 {
-                        let together = if f == g { w } else { 0.0 }
-                            - dot(count, &one.row[f], &other.near[g])
-                            - dot(count, &one.near[f], &other.row[g])
-                            + dot(count, &through[f], &other.row[g]);
-                        for k in 0..count {
-                            left[k] += w * together * one.by[f][k] * other.by[g][k];
-                        }
+                        let swallowed = dot(&one.row[f], &other.near[g]) - dot(&one.through[f], &other.row[g]);
+                        m[f][g] = times * (m[f][g] - swallowed);
                     }
+                }
+                let [p, q] = &other.by;
+                for k in 0..WIDE {
+                    let first = one.by[0][k] * (m[0][0] * p[k] + m[0][1] * q[k]);
+                    sums.left[k] += first + one.by[1][k] * (m[1][0] * p[k] + m[1][1] * q[k]);
                 }
             }
         }
-        let raise: Params =
-            from(count, |k| (field[k][k] / left[k].max(LEFT * field[k][k]).max(f64::MIN_POSITIVE)).sqrt());
-        for (a, row) in sum.iter_mut().enumerate() {
-            row.iter_mut().zip(&raise).for_each(|(s, r)| *s *= raise[a] * r);
-        }
-        sum
     }
 }
 
