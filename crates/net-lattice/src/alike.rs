@@ -2,7 +2,7 @@
 
 use crate::fit::{Fitter, Observation, Robust};
 use crate::surface::{PARAMETERS, Params};
-use crate::wide::widely;
+use net_image::widely;
 
 /// Distance over which residuals of small and of large tiles may be alike, px of an 848 x 480 px picture: three tiles.
 pub(crate) const REACH_PX: [f64; 2] = [160.0, 320.0];

@@ -1,6 +1,6 @@
 //! Where rays meet the sheet, and the lattice coordinates there.
 
-use crate::surface::Surface;
+use crate::surface::{PARAMETERS, Params, SHAPE, Surface};
 
 impl Surface {
     /// Everything about the sheet that does not change from ray to ray.
@@ -49,6 +49,25 @@ pub(crate) struct Chart {
 pub(crate) struct Point {
     pub s: [f64; 2],
     pub depth: f64,
+}
+
+/// Three-point Gauss: places of [0, 1] and their weights.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// The height polynomial's terms at a point, in the order of [`crate::surface::TERMS`].
+fn terms(x: f64, y: f64) -> [f64; 12] {
+    let (x2, y2, xy) = (x * x, y * y, x * y);
+    [0.5 * x2, xy, 0.5 * y2, x2 * x, x2 * y, x * y2, y2 * y, x2 * x2, x2 * xy, x2 * y2, xy * y2, y2 * y2]
+}
+
+/// Their derivatives by x, and by y.
+fn terms_slope(x: f64, y: f64) -> ([f64; 12], [f64; 12]) {
+    let (x2, y2, xy) = (x * x, y * y, x * y);
+    (
+        [x, y, 0.0, 3.0 * x2, 2.0 * xy, y2, 0.0, 4.0 * x2 * x, 3.0 * x2 * y, 2.0 * x * y2, y2 * y, 0.0],
+        [0.0, x, y, 0.0, x2, 2.0 * xy, 3.0 * y2, 0.0, x2 * x, 2.0 * x2 * y, 3.0 * x * y2, 4.0 * y2 * y],
+    )
 }
 
 impl Chart {
@@ -136,6 +155,72 @@ impl Chart {
         Some(Point { s: self.lattice(a1 * depth - b1, a2 * depth - b2), depth })
     }
 
+    /// Derivatives of the coordinates of a point that a ray meets by all parameters, in their order. `wider`: the same sheet with its crossing angle larger by
+    /// `step`.
+    pub(crate) fn slopes(&self, ray: [f64; 2], point: &Point, wider: &Self, step: f64) -> [Params; 2] {
+        let d = [ray[0], ray[1], 1.0];
+        let along = |axis: &[f64; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
+        let (a1, a2, depth, z) = (along(&self.e1), along(&self.e2), point.depth, self.z);
+        let (x, y) = (a1 * depth - self.e1[2] * z, a2 * depth - self.e2[2] * z);
+        let (hx, hy) = self.slope(x, y);
+        // Coordinates by the place in the tangent plane.
+        let h = 1e-6 * depth;
+        let (right, below) = (self.lattice(x + h, y), self.lattice(x, y + h));
+        let by_place: [[f64; 2]; 2] = std::array::from_fn(|f| [right, below].map(|s| (s[f] - point.s[f]) / h));
+        // Higher by so much, the sheet is met so much farther along the ray.
+        let farther = 1.0 / (along(&self.n) - hx * a1 - hy * a2);
+        let mut out = [[0.0; PARAMETERS]; 2];
+        let mut set = |k: usize, rise: f64, dx: f64, dy: f64| {
+            // Both lie in the tangent plane; the sheet is higher there than the point by `rise`.
+            let deeper = (rise + hx * dx + hy * dy) * farther;
+            for (out, by) in out.iter_mut().zip(&by_place) {
+                out[k] = by[0] * (dx + a1 * deeper) + by[1] * (dy + a2 * deeper);
+            }
+        };
+        // A turn moves what is fixed to the sheet's axes: the point less where the axis meets the sheet.
+        let p = [d[0] * depth, d[1] * depth, depth - z];
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let turned = |axis: &[f64; 3]| axis[i] * p[j] - axis[j] * p[i];
+            set(k, -turned(&self.n), turned(&self.e1), turned(&self.e2));
+        }
+        set(3, self.n[2] * z, -self.e1[2] * z, -self.e2[2] * z);
+        for (k, term) in terms(x, y).into_iter().enumerate() {
+            set(SHAPE + k, term, 0.0, 0.0);
+        }
+        (out[0][4], out[1][5]) = (1.0, 1.0);
+        let turned = wider.lattice(x, y);
+        (0..2).for_each(|f| out[f][6] = (turned[f] - point.s[f]) / step);
+        self.draw_in(x, y, &mut out);
+        out
+    }
+
+    /// Adds to the derivatives what the shape does to the coordinates of a fixed place: see `lattice`.
+    fn draw_in(&self, x: f64, y: f64, out: &mut [Params; 2]) {
+        let (cd, sd) = (self.cd, self.sd);
+        let (s1, s2) = ((cd * x - sd * y) / self.det, (cd * y - sd * x) / self.det);
+        let mut w = [[0.0; PARAMETERS - SHAPE]; 2];
+        (w[0][12], w[1][13]) = (0.5 * s2 * s2, 0.5 * s1 * s1);
+        if self.bent {
+            for (t, weight) in GAUSS {
+                let [first, second] = [(t * s1, s2), (s1, t * s2)];
+                let places = [(first, s1, (cd, sd)), (second, s2, (sd, cd))];
+                for (w, ((p, q), length, (cx, cy))) in w.iter_mut().zip(places) {
+                    let (tx, ty) = terms_slope(cd * p + sd * q, sd * p + cd * q);
+                    let rise: [f64; 12] = std::array::from_fn(|k| cx * tx[k] + cy * ty[k]);
+                    let e: f64 = rise.iter().zip(&self.height).map(|(r, c)| r * c).sum();
+                    w.iter_mut().zip(rise).for_each(|(w, r)| *w -= length * weight * e * r);
+                }
+            }
+        }
+        let (twice, per) = (2.0 * cd * sd, 1.0 / (self.det * self.det));
+        for (f, out) in out.iter_mut().enumerate() {
+            for (k, out) in out[SHAPE..].iter_mut().enumerate() {
+                *out -= self.per_side[f] * per * (w[f][k] - twice * w[1 - f][k]);
+            }
+        }
+    }
+
     /// Lattice coordinates of the point above `(x, y)` of the tangent plane.
     #[inline]
     pub(crate) fn lattice(&self, x: f64, y: f64) -> [f64; 2] {
@@ -146,8 +231,6 @@ impl Chart {
         let mut w2 = 0.5 * self.bending[1] * s1 * s1;
         if self.bent {
             // Inextensible twine: the sheet is drawn in by half the squared slope along each twine, integrated from the axis (3-point Gauss).
-            const GAUSS: [(f64, f64); 3] =
-                [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
             for (t, weight) in GAUSS {
                 let (p, q) = (t * s1, s2);
                 let (hx, hy) = self.slope(cd * p + sd * q, sd * p + cd * q);

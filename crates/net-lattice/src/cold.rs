@@ -88,6 +88,7 @@ impl Workspace {
                 blur,
                 focus: f64::INFINITY,
                 drawn_cell_px: DRAWN_CELL_PX,
+                quick: false,
             });
             let coherence = evidence.v[0].min(evidence.v[1]) / f64::sqrt(2.0 * evidence.tiles.max(1) as f64);
             if settled.is_none() && coherence > 0.8 && evidence.good > 0.9 {

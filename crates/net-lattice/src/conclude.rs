@@ -8,6 +8,7 @@ use crate::config::Config;
 use crate::covariance::{self, Doubt};
 use crate::decision::Evidence;
 use crate::estimate::{Labels, LatticeEstimate};
+use crate::lockin::Window;
 use crate::model::{self, Model};
 use crate::surface::Surface;
 use crate::workspace::{Lock, Workspace};
@@ -29,7 +30,10 @@ impl Workspace {
         let labels = labels.unwrap_or_else(|| Labels::nearest(&surface));
         let scale = if followed { Self::coarse_scale_for } else { Self::scale_for };
         let place = scale(self, surface.depth);
-        let weighed = self.weigh(&surface, place, lock);
+        // What was summed to lock to is turned to where the lattice is now.
+        let gain =
+            if followed { self.sums_at(&surface, place) } else { self.demodulate(&surface, place, &Window::ALL) };
+        let weighed = self.weigh(&surface, place, gain, lock);
         // What the average cell looks like does not change from picture to picture.
         let fold = if followed { lock.evidence.fold() } else { self.fold(&surface, place) };
         let mean_plane = self.mean_plane(&surface);

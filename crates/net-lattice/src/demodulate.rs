@@ -24,6 +24,20 @@ pub(crate) struct TileSum {
     pub count: f64,
 }
 
+impl TileSum {
+    /// The sums at coordinates that are so many cells higher all over the tile.
+    pub(crate) fn turn(&mut self, cells: [f64; 2]) {
+        for (z, cells) in self.z.iter_mut().zip(cells) {
+            let (sin, cos) = (cells * std::f64::consts::TAU).sin_cos();
+            let (mut s, mut c) = (sin, cos);
+            for z in z {
+                *z = [z[0] * c + z[1] * s, z[1] * c - z[0] * s];
+                (s, c) = (s * cos + c * sin, c * cos - s * sin);
+            }
+        }
+    }
+}
+
 /// Blocks side by side.
 pub(crate) const LANES: usize = 8;
 /// A number for each of them.

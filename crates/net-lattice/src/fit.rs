@@ -1,8 +1,10 @@
 //! Gauss-Newton on tile coordinates: which sheet puts the lattice where the tiles say it is.
 
+use crate::chart::Point;
 use crate::numeric::Normal;
 use crate::surface::{PARAMETERS, Params, Surface};
 use crate::view::Site;
+use net_image::widely;
 
 /// Lattice coordinates measured at a site, with their information matrix (xx, xy, yy), 1 / cells².
 #[derive(Debug, Clone, Copy)]
@@ -73,21 +75,28 @@ const STEP: Params = {
     s[5] = 1e-3;
     s
 };
+/// The same of the crossing angle alone, where all others are in closed form.
+const STEP_ANGLE: f64 = 1e-5;
 
 impl Fitter {
-    /// Residuals and their derivatives by the first `count` parameters.
-    pub(crate) fn linearize(&mut self, surface: &Surface, count: usize, observations: &[Observation]) {
-        self.residuals.clear();
-        self.jacobian.clear();
-        self.jacobian.resize(observations.len(), [[0.0; PARAMETERS]; 2]);
+    /// Residuals, and the depth at each site.
+    fn compare(&mut self, surface: &Surface, observations: &[Observation]) {
         let chart = surface.chart();
-        let mut base = [0.0; 2];
+        self.residuals.clear();
         self.depth.clear();
         for o in observations {
             let seen = chart.at(o.site.ray[0], o.site.ray[1]).filter(|_| o.weight[0] + o.weight[2] > 0.0);
             self.depth.push(seen.map_or(0.0, |p| p.depth));
             self.residuals.push(seen.map_or([f64::NAN; 2], |p| [o.s[0] - p.s[0], o.s[1] - p.s[1]]));
         }
+    }
+
+    /// Residuals and their derivatives by the first `count` parameters.
+    pub(crate) fn linearize(&mut self, surface: &Surface, count: usize, observations: &[Observation]) {
+        self.compare(surface, observations);
+        self.jacobian.clear();
+        self.jacobian.resize(observations.len(), [[0.0; PARAMETERS]; 2]);
+        let mut base = [0.0; 2];
         for k in 0..count {
             if k == 4 || k == 5 {
                 for j in &mut self.jacobian {
@@ -113,6 +122,23 @@ impl Fitter {
         }
     }
 
+    /// The same with the derivatives in closed form: a third of the time.
+    fn linearize_quickly(&mut self, surface: &Surface, count: usize, observations: &[Observation]) {
+        self.compare(surface, observations);
+        self.jacobian.clear();
+        self.jacobian.resize(observations.len(), [[0.0; PARAMETERS]; 2]);
+        let mut d = [0.0; PARAMETERS];
+        d[6] = STEP_ANGLE;
+        let (chart, wider) = (surface.chart(), surface.stepped(&d).chart());
+        for (((o, r), depth), j) in observations.iter().zip(&self.residuals).zip(&self.depth).zip(&mut self.jacobian) {
+            if !r[0].is_nan() {
+                let point = Point { s: [o.s[0] - r[0], o.s[1] - r[1]], depth: *depth };
+                *j = chart.slopes(o.site.ray, &point, &wider, STEP_ANGLE);
+                j.iter_mut().for_each(|j| j[count..].fill(0.0));
+            }
+        }
+    }
+
     /// Normal equations of the last linearization.
     pub(crate) fn normal(
         &self,
@@ -123,20 +149,7 @@ impl Fitter {
         prior: &Prior,
     ) -> Normal<PARAMETERS> {
         let mut n = Normal::new();
-        for ((o, r), j) in observations.iter().zip(&self.residuals).zip(&self.jacobian) {
-            if r[0].is_nan() {
-                continue;
-            }
-            let w = robust.weigh(o.weight, *r);
-            let wr = [w[0] * r[0] + w[1] * r[1], w[1] * r[0] + w[2] * r[1]];
-            for a in 0..count {
-                let wa = [w[0] * j[0][a] + w[1] * j[1][a], w[1] * j[0][a] + w[2] * j[1][a]];
-                for b in 0..=a {
-                    n.a[a][b] += wa[0] * j[0][b] + wa[1] * j[1][b];
-                }
-                n.b[a] += j[0][a] * wr[0] + j[1][a] * wr[1];
-            }
-        }
+        add_rows(self, count, observations, robust, &mut n);
         let deviation = surface.deviation(prior.angle);
         for k in 0..count {
             if prior.sigma[k].is_finite() {
@@ -192,26 +205,79 @@ impl Fitter {
         prior: &Prior,
         iterations: usize,
     ) -> Option<Fit> {
+        let mut fit = None;
         let mut surface = *start;
-        let mut covariance = [[0.0; PARAMETERS]; PARAMETERS];
         for _ in 0..iterations {
             self.linearize(&surface, count, observations);
-            let normal = self.normal(&surface, count, observations, robust, prior);
-            let (mut d, inverse) = normal.solve(count)?;
-            covariance = inverse;
-            let turn = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            let limit = |limit: f64, x: f64| limit / (x.abs() + 1e-12);
-            let damp = 1f64.min(limit(0.15, turn)).min(limit(0.15, d[3])).min(limit(0.12, d[6]));
-            d.iter_mut().for_each(|d| *d *= damp);
-            surface = surface.stepped(&d);
-            let sound = surface.rotation[(2, 2)] > 0.12
-                && surface.depth > 1.5 * surface.sides[0].min(surface.sides[1])
-                && (0.3..=2.84).contains(&surface.angle)
-                && (surface.angle - prior.angle).abs() < 0.8;
-            if !sound {
-                return None;
+            let step = self.step(&surface, count, observations, robust, prior)?;
+            surface = step.surface;
+            fit = Some(step);
+        }
+        fit
+    }
+
+    /// The same from a start that is a fraction of a cell off: two steps with the derivatives of the first.
+    pub(crate) fn settle(
+        &mut self,
+        start: &Surface,
+        count: usize,
+        observations: &[Observation],
+        robust: Robust,
+        prior: &Prior,
+    ) -> Option<Fit> {
+        self.linearize_quickly(start, count, observations);
+        let near = self.step(start, count, observations, robust, prior)?.surface;
+        self.compare(&near, observations);
+        self.step(&near, count, observations, robust, prior)
+    }
+
+    /// One step by the last derivatives and residuals.
+    fn step(
+        &self,
+        surface: &Surface,
+        count: usize,
+        observations: &[Observation],
+        robust: Robust,
+        prior: &Prior,
+    ) -> Option<Fit> {
+        let (mut d, covariance) = self.normal(surface, count, observations, robust, prior).solve(count)?;
+        let turn = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        let limit = |limit: f64, x: f64| limit / (x.abs() + 1e-12);
+        let damp = 1f64.min(limit(0.15, turn)).min(limit(0.15, d[3])).min(limit(0.12, d[6]));
+        d.iter_mut().for_each(|d| *d *= damp);
+        let surface = surface.stepped(&d);
+        let sound = surface.rotation[(2, 2)] > 0.12
+            && surface.depth > 1.5 * surface.sides[0].min(surface.sides[1])
+            && (0.3..=2.84).contains(&surface.angle)
+            && (surface.angle - prior.angle).abs() < 0.8;
+        sound.then_some(Fit { surface, covariance })
+    }
+}
+
+widely! {
+    /// Adds what the observations say.
+    fn add_rows<'a>(
+        fitter: &'a Fitter,
+        count: usize,
+        observations: &'a [Observation],
+        robust: Robust,
+        n: &'a mut Normal<PARAMETERS>,
+    ) -> () {
+        for ((o, r), j) in observations.iter().zip(&fitter.residuals).zip(&fitter.jacobian) {
+            if r[0].is_nan() {
+                continue;
+            }
+            let w = robust.weigh(o.weight, *r);
+            let wr = [w[0] * r[0] + w[1] * r[1], w[1] * r[0] + w[2] * r[1]];
+            let [p, q] = j;
+            for a in 0..count {
+                let wa = [w[0] * p[a] + w[1] * q[a], w[1] * p[a] + w[2] * q[a]];
+                // The whole row, though half of it would do: in one go.
+                for b in 0..PARAMETERS {
+                    n.a[a][b] += wa[0] * p[b] + wa[1] * q[b];
+                }
+                n.b[a] += p[a] * wr[0] + q[a] * wr[1];
             }
         }
-        Some(Fit { surface, covariance })
     }
 }

@@ -44,6 +44,7 @@
 
 mod alike;
 mod background;
+mod bar;
 mod chart;
 mod coarse;
 mod cold;

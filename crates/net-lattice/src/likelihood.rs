@@ -3,6 +3,7 @@
 
 use net_image::{Image, widely};
 
+use crate::bar::Bar;
 use crate::fit::Observation;
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::{log2_rough, magnitude_quantiles, median, wrap};
@@ -115,6 +116,8 @@ pub(crate) struct Drawing {
     pub high_pass: f64,
     /// Compare one block in four only.
     pub sparse: bool,
+    /// Draw in closed form, where slopes are asked for.
+    pub quick: bool,
 }
 
 /// Buffers of the comparison; one picture, many drawings.
@@ -135,6 +138,8 @@ pub(crate) struct Likelihood {
     den: Image<f32>,
     amplitude: Image<f32>,
     variance: Image<f32>,
+    /// Twine widths along the two families, cells, and what they look like.
+    widths: [f32; 2],
     profiles: [Profile; 2],
     histogram: Vec<u32>,
     order: Vec<f64>,
@@ -175,6 +180,7 @@ impl Likelihood {
 
     /// Twine widths along the two families, cells.
     pub(crate) fn set_widths(&mut self, widths: [f64; 2]) {
+        self.widths = widths.map(|w| w as f32);
         for (p, w) in self.profiles.iter_mut().zip(widths) {
             p.prepare(w);
         }
@@ -182,10 +188,10 @@ impl Likelihood {
 
     /// Draws the net and its derivatives, and removes from it what the high-pass filter removed from the picture.
     fn draw<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing, smoother: &mut Smoother) {
-        if SLOPES {
-            draw_with_slopes(self, map, drawing)
-        } else {
-            draw_alone(self, map, drawing)
+        match (SLOPES, drawing.quick) {
+            (true, true) => draw_quickly(self, map, drawing),
+            (true, false) => draw_with_slopes(self, map, drawing),
+            (false, _) => draw_alone(self, map, drawing),
         }
         if drawing.sparse {
             fill_in(&mut self.mean);
@@ -201,41 +207,44 @@ impl Likelihood {
 
     /// Block by block, and each block's mean.
     #[inline(always)]
-    fn draw_blocks<const SLOPES: bool>(&mut self, map: &PhaseMap, drawing: &Drawing) {
+    fn draw_blocks<const SLOPES: bool, const QUICK: bool>(&mut self, map: &PhaseMap, drawing: &Drawing) {
         let bx = self.blocks_x;
         let (sign, both) = contrasts(drawing.polarity);
         for y in 0..self.blocks_y {
             for x in 0..bx {
                 let b = y * bx + x;
                 self.used[b] = false;
-                let mean = &mut self.mean.data_mut()[b];
-                *mean = 0.0;
+                self.mean.data_mut()[b] = 0.0;
                 if drawing.sparse && !chosen(x, y) {
                     continue;
                 }
                 let Some(planes) = map.block(x, y) else { continue };
                 self.used[b] = true;
-                let rows: [_; 2] = std::array::from_fn(|f| {
-                    let p = &planes[f];
-                    self.profiles[f].row(drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt())
-                });
-                let (t, d1, d2) = (&mut self.drawn[b], &mut self.d1[b], &mut self.d2[b]);
+                let blur = |f: usize| {
+                    let p: &Plane = &planes[f];
+                    drawing.blur as f32 * (p.du * p.du + p.dv * p.dv).sqrt()
+                };
                 let [q1, q2] = std::array::from_fn(|f| positions(&planes[f], drawing.offset[f]));
+                let ((p1, g1), (p2, g2)) = (self.look::<QUICK>(0, blur(0), &q1), self.look::<QUICK>(1, blur(1), &q2));
+                let (t, d1, d2) = (&mut self.drawn[b], &mut self.d1[b], &mut self.d2[b]);
+                // Whole arrays, of which the compiler knows that they are not one.
+                *t = std::array::from_fn(|k| sign[0] * p1[k] + sign[1] * p2[k] - both * p1[k] * p2[k]);
                 if SLOPES {
-                    let ((p1, g1), (p2, g2)) = (look_up_all(rows[0], &q1), look_up_all(rows[1], &q2));
-                    for k in 0..PIXELS {
-                        t[k] = sign[0] * p1[k] + sign[1] * p2[k] - both * p1[k] * p2[k];
-                        d1[k] = (sign[0] - both * p2[k]) * g1[k];
-                        d2[k] = (sign[1] - both * p1[k]) * g2[k];
-                    }
-                } else {
-                    let (p1, p2) = (look_up_all(rows[0], &q1).0, look_up_all(rows[1], &q2).0);
-                    for k in 0..PIXELS {
-                        t[k] = sign[0] * p1[k] + sign[1] * p2[k] - both * p1[k] * p2[k];
-                    }
+                    *d1 = std::array::from_fn(|k| (sign[0] - both * p2[k]) * g1[k]);
+                    *d2 = std::array::from_fn(|k| (sign[1] - both * p1[k]) * g2[k]);
                 }
-                *mean = total([t], |[t]| t) / PIXELS as f32;
+                self.mean.data_mut()[b] = total([&self.drawn[b]], |[t]| t) / PIXELS as f32;
             }
+        }
+    }
+
+    /// Coverage by the twine of one family, and its derivative, blurred over so many cells.
+    #[inline(always)]
+    fn look<const QUICK: bool>(&self, family: usize, blur: f32, q: &Block) -> (Block, Block) {
+        if QUICK {
+            Bar::new(self.widths[family], blur).cover(q)
+        } else {
+            look_up_all(self.profiles[family].row(blur), q)
         }
     }
 
@@ -322,6 +331,18 @@ impl Likelihood {
         self.draw::<true>(map, drawing, smoother);
         self.fit_amplitude(drawing, smoother);
         self.cap_amplitude();
+        square_residuals(self, drawing);
+        if drawing.sparse {
+            fill_in(&mut self.num);
+        }
+        smoother.blur(&self.num, (drawing.contrast_length / BLOCK as f64) as f32, &mut self.variance);
+        sum_tiles(self, grid);
+        self.solve_tiles(surface, grid, out);
+    }
+
+    /// Mean square of what the drawing leaves of the picture, block by block, clipped.
+    #[inline(always)]
+    fn square_blocks(&mut self, drawing: &Drawing) {
         let clip = (4.0 * self.noise).powi(2);
         for b in 0..self.used.len() {
             if drawing.sparse && !chosen(b % self.blocks_x, b / self.blocks_x) {
@@ -332,12 +353,6 @@ impl Likelihood {
             let sum = total([&self.image[b], &self.drawn[b]], |[i, t]| (i - a * t).powi(2).min(clip));
             self.num.data_mut()[b] = sum / PIXELS as f32;
         }
-        if drawing.sparse {
-            fill_in(&mut self.num);
-        }
-        smoother.blur(&self.num, (drawing.contrast_length / BLOCK as f64) as f32, &mut self.variance);
-        sum_tiles(self, grid);
-        self.solve_tiles(surface, grid, out);
     }
 
     /// Gradient and information of every tile.
@@ -356,11 +371,11 @@ impl Likelihood {
                 let variance = self.variance.data()[b].max(1e-7);
                 let per = 1.0 / variance.sqrt();
                 let (mut r, mut w) = ([0.0; PIXELS], [0.0; PIXELS]);
+                let (image, drawn) = (&self.image[b], &self.drawn[b]);
                 for k in 0..PIXELS {
-                    r[k] = self.image[b][k] - a * self.drawn[b][k];
+                    r[k] = image[k] - a * drawn[k];
                     let e = r[k].abs() * per;
-                    let less = 3.0 / e.max(3.0);
-                    w[k] = if e < 6.0 { less } else { 0.0 };
+                    w[k] = 3.0 / e.max(3.0) * f32::from(u8::from(e < 6.0));
                 }
                 let (d1, d2) = (&self.d1[b], &self.d2[b]);
                 let sums = [
@@ -423,12 +438,17 @@ impl Likelihood {
 
 widely! {
     fn draw_with_slopes<'a>(likelihood: &'a mut Likelihood, map: &'a PhaseMap, drawing: &'a Drawing) -> () {
-        likelihood.draw_blocks::<true>(map, drawing);
+        likelihood.draw_blocks::<true, false>(map, drawing);
+    }
+}
+widely! {
+    fn draw_quickly<'a>(likelihood: &'a mut Likelihood, map: &'a PhaseMap, drawing: &'a Drawing) -> () {
+        likelihood.draw_blocks::<true, true>(map, drawing);
     }
 }
 widely! {
     fn draw_alone<'a>(likelihood: &'a mut Likelihood, map: &'a PhaseMap, drawing: &'a Drawing) -> () {
-        likelihood.draw_blocks::<false>(map, drawing);
+        likelihood.draw_blocks::<false, false>(map, drawing);
     }
 }
 widely! {
@@ -444,5 +464,10 @@ widely! {
 widely! {
     fn sum_tiles<'a>(likelihood: &'a mut Likelihood, grid: &'a TileGrid) -> () {
         likelihood.sum_blocks(grid);
+    }
+}
+widely! {
+    fn square_residuals<'a>(likelihood: &'a mut Likelihood, drawing: &'a Drawing) -> () {
+        likelihood.square_blocks(drawing);
     }
 }

@@ -5,52 +5,57 @@ use net_image::{Image, widely};
 use crate::numeric::magnitude_quantiles;
 
 /// Blurs with its buffers kept.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Smoother {
+    /// Least standard deviation, samples, of the Gaussian on averaged samples. Of a wave of two samples, the shortest there is, [`Self::QUICK`] leaves 6e-5, but a
+    /// line from sample to sample is a per cent off.
+    pub least: f32,
     small: Image<f32>,
     half: Image<f32>,
     kernel: Vec<f32>,
     line: Vec<f32>,
+    pairs: Vec<f32>,
+}
+
+impl Default for Smoother {
+    fn default() -> Self {
+        let (small, half) = (Image::default(), Image::default());
+        Self { least: Self::FINE, small, half, kernel: Vec::new(), line: Vec::new(), pairs: Vec::new() }
+    }
 }
 
 impl Smoother {
+    pub(crate) const FINE: f32 = 2.0;
+    pub(crate) const QUICK: f32 = 1.4;
+
     /// Divides a high-passed picture by its local deviation over `sigma` px, of which the `FAINT` quantile of the picture is the least. Outlines
     /// of fish are many times as strong as twine, and there is more noise in one part of a picture than in another; a place has as much say
     /// as it is like a net, not as it is bright (divisive normalisation).
     pub(crate) fn equalize(&mut self, image: &mut Image<f32>, sigma: f32, histogram: &mut Vec<u32>) {
         const FAINT: f64 = 0.3;
-        let f = self.reduce(image, sigma, |p| p * p);
+        let f = reduce_squares(self, image, sigma);
         let [least] = magnitude_quantiles(self.small.data().iter().copied(), [FAINT], histogram);
-        self.expand(f, image.width(), image.height(), |v, energy| {
-            for (h, e) in image.row_mut(v).iter_mut().zip(energy) {
-                *h /= (e + least + 1e-12).sqrt();
-            }
-        });
+        divide_by_root(self, f, least, image);
     }
 
     /// `out = image - blur(image)`, Gaussian of `sigma` px, edges mirrored.
     pub(crate) fn subtract_blur(&mut self, image: &Image<f32>, sigma: f32, out: &mut Image<f32>) {
         out.resize(image.width(), image.height());
-        let f = self.reduce(image, sigma, |p| p);
-        self.expand(f, image.width(), image.height(), |v, smooth| {
-            for ((d, s), b) in out.row_mut(v).iter_mut().zip(image.row(v)).zip(smooth) {
-                *d = s - b;
-            }
-        });
+        subtract_blur(self, image, sigma, out);
     }
 
     /// `out = blur(image)`.
     pub(crate) fn blur(&mut self, image: &Image<f32>, sigma: f32, out: &mut Image<f32>) {
         out.resize(image.width(), image.height());
-        let f = self.reduce(image, sigma, |p| p);
-        self.expand(f, image.width(), image.height(), |v, smooth| out.row_mut(v).copy_from_slice(smooth));
+        blur(self, image, sigma, out);
     }
 
     /// Fills `small` with a blurred function of the picture, a factor smaller, and returns the factor, a power of 2.
+    #[inline(always)]
     fn reduce(&mut self, image: &Image<f32>, sigma: f32, of: impl Fn(f32) -> f32) -> usize {
         let (w, h) = (image.width(), image.height());
         let mut f = 1;
-        while sigma / (2 * f) as f32 >= 2.0 && w / (2 * f) >= 8 && h / (2 * f) >= 8 {
+        while sigma / (2 * f) as f32 >= self.least && w / (2 * f) >= 8 && h / (2 * f) >= 8 {
             f *= 2;
         }
         let (sw, sh) = (w.div_ceil(f), h.div_ceil(f));
@@ -69,9 +74,9 @@ impl Smoother {
             let mut n = sw * f;
             while n > sw {
                 n /= 2;
-                for x in 0..n {
-                    self.line[x] = self.line[2 * x] + self.line[2 * x + 1];
-                }
+                self.pairs.clear();
+                self.pairs.extend(self.line[..2 * n].chunks_exact(2).map(|p| p[0] + p[1]));
+                self.line[..n].copy_from_slice(&self.pairs);
             }
             let small = self.small.row_mut(y);
             let per = 1.0 / (f * rows) as f32;
@@ -85,7 +90,7 @@ impl Smoother {
         let ff = (f * f) as f32;
         let s = if f > 1 { (sigma * sigma - (ff - 1.0) / 12.0 - ff / 6.0).max(0.04) } else { sigma * sigma }.sqrt()
             / f as f32;
-        gauss(self, s);
+        self.gauss(s);
         f
     }
 
@@ -99,6 +104,9 @@ impl Smoother {
         self.kernel.iter_mut().for_each(|k| *k /= sum);
         let (w, h) = (self.small.width(), self.small.height());
         let mirror = |i: isize, n: usize| {
+            if (0..n as isize).contains(&i) {
+                return i as usize;
+            }
             let period = 2 * n as isize;
             let m = i.rem_euclid(period);
             (if m < n as isize { m } else { period - 1 - m }) as usize
@@ -110,33 +118,18 @@ impl Smoother {
             self.line.extend(left.map(|i| row[mirror(i, w)]));
             self.line.extend_from_slice(row);
             self.line.extend(right.map(|i| row[mirror(i, w)]));
-            let out = self.half.row_mut(y);
-            for (x, o) in out.iter_mut().enumerate() {
-                *o = self.kernel[0] * self.line[x + radius];
-            }
-            for (k, g) in self.kernel.iter().enumerate().skip(1) {
-                let (a, b) = (&self.line[radius - k..][..w], &self.line[radius + k..][..w]);
-                for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-                    *o += g * (a + b);
-                }
-            }
+            let line = &self.line;
+            weigh(&self.kernel, self.half.row_mut(y), |k| (&line[radius - k..][..w], &line[radius + k..][..w]));
         }
         for y in 0..h {
-            let out = self.small.row_mut(y);
-            for (o, a) in out.iter_mut().zip(self.half.row(y)) {
-                *o = self.kernel[0] * a;
-            }
-            for (k, g) in self.kernel.iter().enumerate().skip(1) {
-                let a = self.half.row(mirror(y as isize - k as isize, h));
-                let b = self.half.row(mirror((y + k) as isize, h));
-                for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-                    *o += g * (a + b);
-                }
-            }
+            let half = &self.half;
+            let row = |y: isize| half.row(mirror(y, h));
+            weigh(&self.kernel, self.small.row_mut(y), |k| (row(y as isize - k as isize), row((y + k) as isize)));
         }
     }
 
     /// Interpolates `small` bilinearly and hands out row by row.
+    #[inline(always)]
     fn expand(&mut self, f: usize, width: usize, height: usize, mut sink: impl FnMut(usize, &[f32])) {
         if f == 1 {
             for v in 0..height {
@@ -166,13 +159,77 @@ impl Smoother {
     }
 }
 
+/// Outputs side by side that are summed at once.
+const SIDE: usize = 32;
+
+/// The weighted sum of a line and of the lines on either side of it; `pair` gives those `k` away.
+#[inline(always)]
+fn weigh<'a>(kernel: &[f32], out: &mut [f32], pair: impl Fn(usize) -> (&'a [f32], &'a [f32])) {
+    let w = out.len();
+    let mut x = 0;
+    while x < w {
+        // The last ones may be summed twice.
+        let first = if x + SIDE > w { w.saturating_sub(SIDE) } else { x };
+        let wide = SIDE.min(w);
+        let mut sums = [0.0; SIDE];
+        let middle = pair(0).0;
+        if wide < SIDE {
+            for (k, g) in kernel.iter().enumerate() {
+                let (a, b) = pair(k);
+                for (i, sum) in sums[..wide].iter_mut().enumerate() {
+                    *sum += if k == 0 { g * middle[i] } else { g * (a[i] + b[i]) };
+                }
+            }
+            out.copy_from_slice(&sums[..wide]);
+            return;
+        }
+        let lane = |line: &'a [f32]| -> &'a [f32] { &line[first..][..SIDE] };
+        sums.iter_mut().zip(lane(middle)).for_each(|(sum, p)| *sum = kernel[0] * p);
+        for (k, g) in kernel.iter().enumerate().skip(1) {
+            let (a, b) = pair(k);
+            let (a, b) = (lane(a), lane(b));
+            for i in 0..SIDE {
+                sums[i] += g * (a[i] + b[i]);
+            }
+        }
+        out[first..][..SIDE].copy_from_slice(&sums);
+        x += SIDE;
+    }
+}
+
 widely! {
-    fn gauss<'a>(smoother: &'a mut Smoother, sigma: f32) -> () {
-        smoother.gauss(sigma);
+    fn reduce_squares<'a>(smoother: &'a mut Smoother, image: &'a Image<f32>, sigma: f32) -> usize {
+        smoother.reduce(image, sigma, |p| p * p)
+    }
+}
+widely! {
+    fn divide_by_root<'a>(smoother: &'a mut Smoother, f: usize, least: f32, image: &'a mut Image<f32>) -> () {
+        smoother.expand(f, image.width(), image.height(), |v, energy| {
+            for (h, e) in image.row_mut(v).iter_mut().zip(energy) {
+                *h /= (e + least + 1e-12).sqrt();
+            }
+        });
+    }
+}
+widely! {
+    fn subtract_blur<'a>(smoother: &'a mut Smoother, image: &'a Image<f32>, sigma: f32, out: &'a mut Image<f32>) -> () {
+        let f = smoother.reduce(image, sigma, |p| p);
+        smoother.expand(f, image.width(), image.height(), |v, smooth| {
+            for ((d, s), b) in out.row_mut(v).iter_mut().zip(image.row(v)).zip(smooth) {
+                *d = s - b;
+            }
+        });
+    }
+}
+widely! {
+    fn blur<'a>(smoother: &'a mut Smoother, image: &'a Image<f32>, sigma: f32, out: &'a mut Image<f32>) -> () {
+        let f = smoother.reduce(image, sigma, |p| p);
+        smoother.expand(f, image.width(), image.height(), |v, smooth| out.row_mut(v).copy_from_slice(smooth));
     }
 }
 
 /// A line stretched by a factor that the compiler knows.
+#[inline(always)]
 fn stretch<const F: usize>(line: &[f32], out: &mut [f32]) {
     stretch_by(F, line, out);
 }

@@ -11,6 +11,8 @@ use crate::config::Config;
 
 /// Number of parameters of the fullest model: rotation 3, log depth, offsets 2, crossing angle, height 12, thread bending 2.
 pub(crate) const PARAMETERS: usize = 21;
+/// The first of those that are the sheet's shape: height and thread bending.
+pub(crate) const SHAPE: usize = 7;
 /// A step, or a prior's standard deviations, in that order.
 pub(crate) type Params = [f64; PARAMETERS];
 
@@ -210,6 +212,28 @@ mod tests {
         s.height[9] = -0.3;
         s.bending = [0.1, -0.05];
         s
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_coordinates() {
+        let sheet = bent();
+        let turned = |d: [f64; PARAMETERS]| sheet.stepped(&d).chart();
+        let one = |k: usize, step: f64| std::array::from_fn(|i| if i == k { step } else { 0.0 });
+        let (chart, wider) = (sheet.chart(), turned(one(6, 1e-5)));
+        for ray in [[0.02, -0.01], [0.5, 0.3], [-0.6, 0.35]] {
+            let p = chart.at(ray[0], ray[1]).expect("in view");
+            let slopes = chart.slopes(ray, &p, &wider, 1e-5);
+            for k in 0..PARAMETERS {
+                let at = |step: f64| turned(one(k, step)).at(ray[0], ray[1]).expect("in view").s;
+                let (up, down) = (at(1e-4), at(-1e-4));
+                for f in 0..2 {
+                    let difference = (up[f] - down[f]) / 2e-4;
+                    // Newton stops at 1e-7 of the depth: 2e-6 cells over 2e-4.
+                    let off = slopes[f][k] - difference;
+                    assert!(off.abs() < 0.01 + 1e-3 * difference.abs(), "{k} {f}: {off} of {difference}");
+                }
+            }
+        }
     }
 
     #[test]

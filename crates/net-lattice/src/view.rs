@@ -5,6 +5,7 @@ use net_geometry::nalgebra::Vector2;
 use net_image::{GrayView, Image};
 
 use crate::smooth::Smoother;
+use net_image::widely;
 
 /// Pixels along a side of the blocks within which lattice coordinates are linear.
 pub(crate) const BLOCK: usize = 4;
@@ -176,26 +177,7 @@ impl View {
 
     /// Takes a picture in: brightness 0 to 1, averaged down level by level.
     pub(crate) fn load(&mut self, image: GrayView<'_>) {
-        let d = self.reduction;
-        let first = &mut self.levels[0].raw;
-        let width = first.width();
-        for v in 0..first.height() {
-            let row = first.row_mut(v);
-            if d == 1 {
-                for (out, p) in row.iter_mut().zip(image.row(v)) {
-                    *out = f32::from(*p) * (1.0 / 255.0);
-                }
-                continue;
-            }
-            let norm = 1.0 / (255 * d * d) as f32;
-            row.fill(0.0);
-            for dv in 0..d {
-                let src = image.row(v * d + dv);
-                for (out, block) in row.iter_mut().zip(src[..width * d].chunks_exact(d)) {
-                    *out += norm * block.iter().map(|p| u32::from(*p)).sum::<u32>() as f32;
-                }
-            }
-        }
+        take_in(image, self.reduction, &mut self.levels[0].raw);
         self.average_down();
     }
 
@@ -203,13 +185,7 @@ impl View {
     pub(crate) fn average_down(&mut self) {
         for l in 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(l);
-            let (src, dst) = (&below[l - 1].raw, &mut above[0].raw);
-            for v in 0..dst.height() {
-                let (a, b) = (src.row(2 * v), src.row(2 * v + 1));
-                for (u, out) in dst.row_mut(v).iter_mut().enumerate() {
-                    *out = 0.25 * (a[2 * u] + a[2 * u + 1] + b[2 * u] + b[2 * u + 1]);
-                }
-            }
+            average(&below[l - 1].raw, &mut above[0].raw);
         }
     }
 
@@ -236,6 +212,41 @@ impl View {
     /// Length scale, full-resolution px, of the high-pass filter of the drawing's comparison for a cell of that many px.
     pub(crate) fn high_pass_px(&self, cell: f64) -> f64 {
         stepped((0.9 * cell).max(8.0 * self.size.max(self.reduction as f64)))
+    }
+}
+
+widely! {
+    /// Brightness of a picture, 0 to 1, averaged over squares of `d` px.
+    fn take_in<'a>(image: GrayView<'a>, d: usize, out: &'a mut Image<f32>) -> () {
+        let width = out.width();
+        for v in 0..out.height() {
+            let row = out.row_mut(v);
+            if d == 1 {
+                for (out, p) in row.iter_mut().zip(image.row(v)) {
+                    *out = f32::from(*p) * (1.0 / 255.0);
+                }
+                continue;
+            }
+            let norm = 1.0 / (255 * d * d) as f32;
+            row.fill(0.0);
+            for dv in 0..d {
+                let src = image.row(v * d + dv);
+                for (out, block) in row.iter_mut().zip(src[..width * d].chunks_exact(d)) {
+                    *out += norm * block.iter().map(|p| u32::from(*p)).sum::<u32>() as f32;
+                }
+            }
+        }
+    }
+}
+widely! {
+    /// The mean of every two by two.
+    fn average<'a>(src: &'a Image<f32>, dst: &'a mut Image<f32>) -> () {
+        for v in 0..dst.height() {
+            let (a, b) = (src.row(2 * v), src.row(2 * v + 1));
+            for ((out, a), b) in dst.row_mut(v).iter_mut().zip(a.chunks_exact(2)).zip(b.chunks_exact(2)) {
+                *out = 0.25 * (a[0] + a[1] + b[0] + b[1]);
+            }
+        }
     }
 }
 

@@ -33,6 +33,8 @@ const WEAK: f64 = 0.05;
 const FINE: usize = 2;
 /// What counts as near the optical axis, px of an 848 x 480 px picture.
 const NEAR: f64 = 220.0;
+/// How what a lock-in measured loses its weight: a phase of 0.6 rad is off.
+pub(crate) const LOCKED: Robust = Robust::Family(0.6 / std::f64::consts::TAU);
 /// Power of a wave over that of noise from which more adds no weight: knots are not where a perfect lattice has them.
 pub(crate) const LOUDEST: f64 = 60.0;
 /// Smallest cell, full-resolution px on the axis, that is looked for.
@@ -68,6 +70,8 @@ pub(crate) struct Tools {
     /// Sums of a lock-in by column of blocks in one row of tiles, and by tile.
     pub columns: Vec<Columns>,
     pub sums: Vec<TileSum>,
+    /// Cells by which sums are turned.
+    pub turns: Vec<[f64; 2]>,
     pub measurements: Vec<Measurement>,
     /// The same by each look.
     pub looks: [Vec<Said>; LOOKS.len()],
@@ -88,6 +92,8 @@ pub(crate) struct Tools {
     pub loaded: Option<usize>,
     /// The same of `thin`, and the gain of the lock-in.
     pub thin: [(f64, f32); LEVELS],
+    /// The sheet, level and tiling of `sums`, where all of the picture is in them.
+    pub summed: Option<(Surface, (usize, usize))>,
 }
 
 impl Tools {
@@ -96,6 +102,7 @@ impl Tools {
         self.high = [0.0; LEVELS];
         self.loaded = None;
         self.thin = [(0.0, 0.0); LEVELS];
+        self.summed = None;
     }
 }
 
@@ -117,6 +124,8 @@ pub(crate) struct Lock {
     pub focus: f64,
     /// Side of a cell, px, down to which the picture is averaged before it is compared with the drawing.
     pub drawn_cell_px: f64,
+    /// Whether only the rest of a prediction is left to be found: one drawing in closed form, one set of derivatives.
+    pub quick: bool,
 }
 
 impl Lock {
@@ -169,6 +178,7 @@ impl Workspace {
     pub(crate) fn load(&mut self, image: GrayView<'_>) {
         self.view.load(image);
         self.stages = None;
+        self.tools.smoother.least = Smoother::FINE;
         self.tools.forget();
     }
 
@@ -220,6 +230,7 @@ impl Workspace {
         let gain = self.thin(place.0, self.cell_px(surface.depth));
         let t = &mut self.tools;
         let level = &self.view.levels[place.0];
+        t.summed = None;
         t.map.fill(surface, level);
         let (columns, sums) = (&mut t.columns, &mut t.sums);
         demodulate(level, place.1, &t.map, gain, window, columns, sums);
@@ -243,10 +254,9 @@ impl Workspace {
         comb
     }
 
-    /// What a fitted sheet that lies on the twine has for it: first by all harmonics together, then by the first two, whose measurements are left
-    /// behind.
-    pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), lock: &Lock) -> Evidence {
-        let gain = self.demodulate(surface, place, &Window::ALL);
+    /// What the last sums, which are those of this sheet, have for it where it lies on the twine: first by all harmonics together, then by the first two, whose
+    /// measurements are left behind.
+    pub(crate) fn weigh(&mut self, surface: &Surface, place: (usize, usize), gain: f32, lock: &Lock) -> Evidence {
         let sign = lock.polarity.map(|p| f64::from(p.sign()));
         let looks = std::array::from_fn(|f| sign[f] * lock.seed.looks[f]);
         self.comb(surface, place, sign, looks, gain);
@@ -307,25 +317,30 @@ impl Workspace {
         for &(radius, model) in schedule {
             let window = Window { centre: seed.centre, radius: radius * self.view.size };
             self.measure_comb(&surface, place, seed.looks, &window);
+            self.observe_measured(&window);
             let t = &mut self.tools;
-            t.observations.clear();
-            for m in &t.measurements {
-                let w = |f: usize| {
-                    if !m.good || m.snr[f] <= 3.0 {
-                        return 0.0;
-                    }
-                    m.snr[f].min(LOUDEST)
-                        * if m.empty { WEAK } else { 1.0 }
-                        * window.weight(m.site.pixel)
-                        * std::f64::consts::TAU.powi(2)
-                };
-                let s = |f: usize| m.predicted.s[f] + m.phase[f] / std::f64::consts::TAU;
-                t.observations.push(Observation { site: m.site, s: [s(0), s(1)], weight: [w(0), 0.0, w(1)] });
-            }
-            let robust = Robust::Family(0.6 / std::f64::consts::TAU);
-            surface = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?.surface;
+            surface = t.fitter.fit(&surface, model.parameters(), &t.observations, LOCKED, &self.prior, 2)?.surface;
         }
         Some(surface)
+    }
+
+    /// The last measurements as observations, weighted by a window.
+    pub(crate) fn observe_measured(&mut self, window: &Window) {
+        let t = &mut self.tools;
+        t.observations.clear();
+        for m in &t.measurements {
+            let w = |f: usize| {
+                if !m.good || m.snr[f] <= 3.0 {
+                    return 0.0;
+                }
+                m.snr[f].min(LOUDEST)
+                    * if m.empty { WEAK } else { 1.0 }
+                    * window.weight(m.site.pixel)
+                    * std::f64::consts::TAU.powi(2)
+            };
+            let s = |f: usize| m.predicted.s[f] + m.phase[f] / std::f64::consts::TAU;
+            t.observations.push(Observation { site: m.site, s: [s(0), s(1)], weight: [w(0), 0.0, w(1)] });
+        }
     }
 
     /// How to draw and compare a net at `depth` on `level`, high-passed for cells of `cell` px.
@@ -340,6 +355,7 @@ impl Workspace {
             contrast_length: (36.0 * self.view.size).max(0.8 * cell) / scale,
             high_pass: self.view.high_pass_px(cell) / scale,
             sparse: false,
+            quick: false,
         }
     }
 
@@ -403,7 +419,8 @@ impl Workspace {
         self.high(level, cell);
         self.load_likelihood(level);
         let focus = self.window(lock.focus);
-        let drawing = Drawing { sparse, ..self.drawing(level, cell, lock.polarity, lock.blur) };
+        let quick = lock.quick;
+        let drawing = Drawing { sparse, quick, ..self.drawing(level, cell, lock.polarity, lock.blur) };
         let t = &mut self.tools;
         let view = &self.view.levels[level];
         let mut fit = None;
@@ -419,7 +436,12 @@ impl Workspace {
                 let w = focus.weight(o.site.pixel);
                 o.weight.iter_mut().for_each(|o| *o *= w);
             }
-            let done = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 2)?;
+            let count = model.parameters();
+            let done = if lock.quick {
+                t.fitter.settle(&surface, count, &t.observations, robust, &self.prior)?
+            } else {
+                t.fitter.fit(&surface, count, &t.observations, robust, &self.prior, 2)?
+            };
             surface = done.surface;
             fit = Some((done, robust));
         }
