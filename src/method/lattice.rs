@@ -327,12 +327,16 @@ struct SheetMap<'a> {
 
 impl LatticeMap for SheetMap<'_> {
     fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
-        self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j)).map(|(pixel, _)| pixel)
+        self.place(i, j).map(|(pixel, _)| pixel)
     }
 
     fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
-        let (_, depth) = self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j))?;
-        Some(0.5 * (self.camera.fx() + self.camera.fy()) / depth)
+        self.place(i, j).map(|(_, scale)| scale)
+    }
+
+    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
+        let (pixel, depth) = self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j))?;
+        Some((pixel, 0.5 * (self.camera.fx() + self.camera.fy()) / depth))
     }
 
     fn seed(&self) -> Option<(i32, i32)> {

@@ -114,13 +114,17 @@ impl TrueMap<'_> {
 
 impl LatticeMap for TrueMap<'_> {
     fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
-        // A polynomial means nothing far from what it was fitted to.
-        let away = (i - f64::from(self.seed.0)).abs().max((j - f64::from(self.seed.1)).abs());
-        (away < self.reach + 3.0).then(|| self.camera.pixel_from_point(self.point(i, j))).flatten()
+        self.place(i, j).map(|(pixel, _)| pixel)
     }
     fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
-        let depth = self.point(i, j).z;
-        (depth > 0.0).then(|| 0.5 * (self.camera.fx() + self.camera.fy()) / depth)
+        self.place(i, j).map(|(_, scale)| scale)
+    }
+    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
+        // A polynomial means nothing far from what it was fitted to.
+        let away = (i - f64::from(self.seed.0)).abs().max((j - f64::from(self.seed.1)).abs());
+        let point = (away < self.reach + 3.0).then(|| self.point(i, j))?;
+        let scale = (point.z > 0.0).then(|| 0.5 * (self.camera.fx() + self.camera.fy()) / point.z)?;
+        Some((self.camera.pixel_from_point(point)?, scale))
     }
     fn seed(&self) -> Option<Index> {
         Some(self.seed)
@@ -135,11 +139,14 @@ pub struct EstimatedMap<'a> {
 
 impl LatticeMap for EstimatedMap<'_> {
     fn pixel(&self, i: f64, j: f64) -> Option<Vector2<f64>> {
-        self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j)).map(|(pixel, _)| pixel)
+        self.place(i, j).map(|(pixel, _)| pixel)
     }
     fn pixels_per_metre(&self, i: f64, j: f64) -> Option<f64> {
-        let (_, depth) = self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j))?;
-        Some(0.5 * (self.camera.fx() + self.camera.fy()) / depth)
+        self.place(i, j).map(|(_, scale)| scale)
+    }
+    fn place(&self, i: f64, j: f64) -> Option<(Vector2<f64>, f64)> {
+        let (pixel, depth) = self.estimate.pixel_from_lattice(self.camera, Vector2::new(i, j))?;
+        Some((pixel, 0.5 * (self.camera.fx() + self.camera.fy()) / depth))
     }
     fn seed(&self) -> Option<Index> {
         let axis = Vector2::new(self.camera.cx(), self.camera.cy());
