@@ -8,14 +8,15 @@ use crate::config::Config;
 use crate::decision::Evidence;
 use crate::estimate::LatticeEstimate;
 use crate::fit::{Observation, Robust};
-use crate::likelihood::Polarity;
 use crate::lockin::Window;
 use crate::model::{self, Model};
+use crate::passes::LOUDEST;
+use crate::polarity::Polarity;
 use crate::refine;
 use crate::seed::Seed;
 use crate::stages::Stages;
 use crate::surface::Surface;
-use crate::workspace::{LOUDEST, Lock, Workspace};
+use crate::workspace::{Lock, Workspace};
 
 /// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
 const COLD: [(f64, Model); 7] = [

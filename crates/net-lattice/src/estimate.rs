@@ -3,8 +3,8 @@ use net_geometry::{Camera, Plane, Pose};
 
 use crate::comb::Looks;
 use crate::decision::Evidence;
-use crate::likelihood::Polarity;
 use crate::model::Model;
+use crate::polarity::Polarity;
 use crate::surface::Surface;
 
 /// Where the net is. Angles in rad, lengths in m; frames as in [`net_geometry`].

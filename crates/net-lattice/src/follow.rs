@@ -7,10 +7,11 @@ use crate::config::Config;
 use crate::estimate::LatticeEstimate;
 use crate::lockin::Window;
 use crate::model::Model;
+use crate::passes::LOCKED;
 use crate::seed::Seed;
 use crate::smooth::Smoother;
 use crate::surface::Surface;
-use crate::workspace::{LOCKED, Lock, Workspace};
+use crate::workspace::{Lock, Workspace};
 
 /// Side of a cell, px, that is fine enough to draw where all that is to be found is the rest of a prediction: a fourth of the pixels of a first picture's, each of them of a
 /// fourth of the noise.

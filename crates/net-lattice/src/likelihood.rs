@@ -4,102 +4,15 @@
 use net_image::{Image, widely};
 
 use crate::bar::Bar;
+use crate::blocks::{Block, PIXELS, chosen, fill_in, positions, total};
 use crate::fit::Observation;
 use crate::map::{PhaseMap, Plane};
-use crate::numeric::{log2_rough, magnitude_quantiles, median, wrap};
+use crate::numeric::{log2_rough, magnitude_quantiles, median};
+use crate::polarity::{Polarity, contrasts};
 use crate::smooth::Smoother;
 use crate::surface::Surface;
 use crate::template::{Profile, look_up_all};
 use crate::view::{BLOCK, Level, TileGrid};
-
-/// Sum of a function of the blocks' pixels, eight sums side by side: what the processor adds at once.
-#[inline(always)]
-fn total<const N: usize>(blocks: [&Block; N], f: impl Fn([f32; N]) -> f32) -> f32 {
-    let mut sums = [0.0; 8];
-    for k in (0..PIXELS).step_by(8) {
-        for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += f(std::array::from_fn(|n| blocks[n][k + lane]));
-        }
-    }
-    let pair = |k: usize| sums[k] + sums[k + 4];
-    (pair(0) + pair(1)) + (pair(2) + pair(3))
-}
-
-/// Cells from the nearest twine, of a block's pixels.
-#[inline(always)]
-fn positions(plane: &Plane, offset: f32) -> Block {
-    let mut q = [0.0; PIXELS];
-    for (k, q) in q.iter_mut().enumerate() {
-        let (u, v) = ((k % BLOCK) as f32 - 1.5, (k / BLOCK) as f32 - 1.5);
-        *q = wrap(plane.s + offset + plane.du * u + plane.dv * v);
-    }
-    q
-}
-
-/// Gives blocks that a sparse comparison leaves out the mean of those beside them.
-fn fill_in(blocks: &mut Image<f32>) {
-    let (bx, by) = (blocks.width(), blocks.height());
-    for y in (0..by).step_by(2) {
-        let row = blocks.row_mut(y);
-        for x in (0..bx).filter(|x| !chosen(*x, y)) {
-            let left = x.checked_sub(1).unwrap_or(x + 1).min(bx - 1);
-            let right = if x + 1 < bx { x + 1 } else { x.saturating_sub(1) };
-            row[x] = 0.5 * (row[left] + row[right]);
-        }
-    }
-    for y in (1..by).step_by(2) {
-        let (above, rest) = blocks.data_mut()[(y - 1) * bx..].split_at_mut(bx);
-        let (row, below) = rest.split_at_mut(bx);
-        let below = below.get(..bx).unwrap_or(above);
-        for ((m, a), b) in row.iter_mut().zip(above.iter()).zip(below) {
-            *m = 0.5 * (a + b);
-        }
-    }
-}
-
-/// The one block in four of a sparse comparison: every second of every second row, each such row a block aside of the last.
-fn chosen(x: usize, y: usize) -> bool {
-    y.is_multiple_of(2) && (x + y / 2).is_multiple_of(2)
-}
-
-const PIXELS: usize = BLOCK * BLOCK;
-type Block = [f32; PIXELS];
-
-/// Bright twine on dark water, or dark twine on bright water.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Polarity {
-    /// Twine brighter than what is behind it.
-    Bright,
-    /// Twine darker than what is behind it.
-    Dark,
-}
-
-impl Polarity {
-    /// Both families alike, as they nearly always are.
-    pub(crate) const ALIKE: [[Self; 2]; 2] = [[Self::Bright; 2], [Self::Dark; 2]];
-
-    /// Cells from where the lock-in has a twine, as if it were bright, to where it is.
-    pub(crate) fn offset(self) -> f32 {
-        match self {
-            Self::Bright => 0.0,
-            Self::Dark => 0.5,
-        }
-    }
-
-    pub(crate) fn sign(self) -> f32 {
-        match self {
-            Self::Bright => 1.0,
-            Self::Dark => -1.0,
-        }
-    }
-}
-
-/// Contrast of both families, and how much of it is lost where they cross: twines alike are one there, a bright and a dark one nothing.
-#[inline]
-pub(crate) fn contrasts(polarity: [Polarity; 2]) -> ([f32; 2], f32) {
-    let sign = polarity.map(Polarity::sign);
-    (sign, 0.5 * (sign[0] + sign[1]))
-}
 
 /// How the net is drawn and compared.
 #[derive(Debug, Clone, Copy)]

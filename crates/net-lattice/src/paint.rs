@@ -3,9 +3,9 @@
 
 use net_image::Image;
 
-use crate::likelihood::Polarity;
 use crate::map::{PhaseMap, Plane};
 use crate::numeric::{median, wrap};
+use crate::polarity::Polarity;
 use crate::smooth::Smoother;
 use crate::view::{BLOCK, Level};
 

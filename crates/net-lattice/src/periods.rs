@@ -1,8 +1,8 @@
 //! Which cell is the true one: a net at a third of the distance with a third of the meshes is nearly the same picture.
 
 use crate::comb::Looks;
-use crate::likelihood::Polarity;
 use crate::lockin::Window;
+use crate::polarity::Polarity;
 use crate::surface::Surface;
 use crate::view::LEVELS;
 use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
