@@ -1,11 +1,11 @@
 use net_geometry::{Camera, Mesh, Pose};
 use net_image::GrayView;
 
+use crate::answer::estimate::LatticeEstimate;
+use crate::answer::stages::Stages;
 use crate::config::Config;
 use crate::error::Result;
-use crate::estimate::LatticeEstimate;
-use crate::stages::Stages;
-use crate::view::View;
+use crate::picture::view::View;
 use crate::workspace::Workspace;
 
 /// Finds a net in single pictures, and follows it.

@@ -1,22 +1,23 @@
 //! One lattice on one hung sheet, fitted to the whole picture: from one camera, where the net is, how it is turned and bent, how its meshes
 //! have sheared, and how far to trust the answer.
 //!
-//! # Stages, one file each, in the order data flows
-//! 1. `view`: the picture averaged down to a pyramid, the rays through its grid, the tiles that gather evidence.
-//! 2. `spectra`, `coarse`: whitened power spectra of overlapping tiles.
-//! 3. `search`, `score`, `refine`: which planes, turns, depths and crossing angles put both families' harmonics on power in *all* tiles. A single spectrum cannot
-//!    tell the sign of a tilt; the change of the wave vectors from tile to tile does. `background`: what hypotheses score that are not there.
-//! 4. `surface`, `chart`, `map`: the sheet, and the lattice coordinates it gives every pixel (rays, so any lens).
-//! 5. `seed`, `demodulate`, `comb`, `lockin`, `fit`: the picture demodulated along the predicted waves; Gauss-Newton on the phases left over, in a window that grows.
-//! 6. `template`, `likelihood`: the twine drawn as it should look; how much better that explains the picture, and how each tile would move it.
-//!    Used to tell bright twine from dark, the true cell from rival periods, and for the last digits.
-//! 7. `model`: flat square, rhomb, quadratic to quartic sheet, by the Bayesian information criterion.
-//! 8. `fold`: all cells on top of each other; the average cell must look like two crossing twines.
-//! 9. `decision`, `covariance`: a probability from statistics that the fit cannot raise, and errors that grow when the model does not fit.
+//! # Folders, in the order data flows
+//! 1. `picture`: averaged down to a pyramid, the rays through its grid and the tiles that gather evidence (`view`); what of it lies along a lattice: coordinates of
+//!    every pixel (`map`), sums over tiles along the predicted waves (`demodulate`), all cells on top of each other (`fold`).
+//! 2. `search`: whitened power spectra of overlapping tiles (`spectra`, `coarse`), and which planes, turns, depths and crossing angles put both families' harmonics
+//!    on power in *all* tiles (`table`, `score`, `refine`). A single spectrum cannot tell the sign of a tilt; the change of the wave vectors from tile to tile does.
+//!    `background`: what hypotheses score that are not there.
+//! 3. `sheet`: the hung net (`surface`, rays that meet it in `chart`: any lens), its fit to what tiles say (`fit`), how much of it they support (`model`: flat
+//!    square, rhomb, quadratic to quartic, by the Bayesian information criterion), and errors that grow when the model does not fit (`covariance`, `alike`).
+//! 4. `lock`: phases left over by the prediction, all harmonics read together (`comb`, `lockin`), where to begin (`seed`), outwards from there (`spread`), fitted in a
+//!    window that grows (`passes`).
+//! 5. `drawing`: the twine as it should look (`template`, `bar`, `polarity`), how much better that explains the picture and how each tile would move it
+//!    (`likelihood`, `compare`): for the true cell, for bright or dark, and for the last digits. `paint`: a net taken out of the picture.
+//! 6. `answer`: the estimate, a probability from statistics that the fit cannot raise (`decision`), names and nodes.
+//! 7. `start` puts it all together: a first picture (`cold`, its true cell in `periods`), a next one (`follow`), the end of both (`conclude`), and a net behind the net
+//!    (`layers`).
 //!
-//! `estimator` is the door; `cold` and `follow` put the stages together for a first and for a next picture, `conclude` ends both; `workspace`
-//! is what they share.
-//! 10. `layers`, `paint`: the net found painted over, and all of the above once more for one behind it.
+//! `estimator` is the door; `workspace` is what the stages share.
 //!
 //! # Conventions
 //! Frames, pixels and units are those of [`net_geometry`]. Lattice coordinates are in cells. Of a bent net the pose is that of the tangent
@@ -42,58 +43,25 @@
 // Dense matrix code reads best with its indices.
 #![allow(clippy::needless_range_loop)]
 
-mod alike;
-mod background;
-mod bar;
-mod blocks;
-mod chart;
-mod coarse;
-mod cold;
-mod comb;
-mod compare;
-mod conclude;
+mod answer;
 mod config;
-mod covariance;
-mod decision;
-mod demodulate;
+mod drawing;
 mod error;
-mod estimate;
 mod estimator;
-mod fit;
-mod fold;
-mod follow;
-mod layers;
-mod likelihood;
-mod lockin;
-mod map;
-mod model;
-mod naming;
-mod nodes;
-mod numeric;
-mod paint;
-mod passes;
-mod periods;
-mod polarity;
-mod refine;
-mod score;
+mod lock;
+mod picture;
 mod search;
-mod seed;
-mod smooth;
-mod spectra;
-mod spread;
-mod stages;
-mod surface;
-mod template;
-mod view;
+mod sheet;
+mod start;
 mod workspace;
 
+pub use answer::decision::Evidence;
+pub use answer::estimate::LatticeEstimate;
+pub use answer::nodes::Node;
+pub use answer::stages::Stages;
 pub use config::Config;
-pub use decision::Evidence;
+pub use drawing::polarity::Polarity;
 pub use error::{Error, Result};
-pub use estimate::LatticeEstimate;
 pub use estimator::LatticeEstimator;
-pub use model::Model;
-pub use nodes::Node;
-pub use polarity::Polarity;
-pub use stages::Stages;
-pub use surface::Surface;
+pub use sheet::model::Model;
+pub use sheet::surface::Surface;

@@ -1,0 +1,7 @@
+//! What tiles say of a lattice that is nearly right: residual phases of all harmonics, where to begin and how to go outwards.
+
+pub(crate) mod comb;
+pub(crate) mod lockin;
+pub(crate) mod passes;
+pub(crate) mod seed;
+pub(crate) mod spread;
