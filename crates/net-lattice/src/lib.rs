@@ -2,22 +2,22 @@
 //! have sheared, and how far to trust the answer.
 //!
 //! # Folders, in the order data flows
-//! 1. `picture`: averaged down to a pyramid, the rays through its grid and the tiles that gather evidence (`view`); what of it lies along a lattice: coordinates of
-//!    every pixel (`map`), sums over tiles along the predicted waves (`demodulate`), all cells on top of each other (`fold`).
+//! 1. `picture`: averaged down to a pyramid, the rays through its grid and the tiles that gather evidence (`view`).
 //! 2. `search`: whitened power spectra of overlapping tiles (`spectra`, `coarse`), and which planes, turns, depths and crossing angles put both families' harmonics
 //!    on power in *all* tiles (`table`, `score`, `refine`). A single spectrum cannot tell the sign of a tilt; the change of the wave vectors from tile to tile does.
 //!    `background`: what hypotheses score that are not there.
-//! 3. `sheet`: the hung net (`surface`, rays that meet it in `chart`: any lens), its fit to what tiles say (`fit`), how much of it they support (`model`: flat
-//!    square, rhomb, quadratic to quartic, by the Bayesian information criterion), and errors that grow when the model does not fit (`covariance`, `alike`).
-//! 4. `lock`: phases left over by the prediction, all harmonics read together (`comb`, `lockin`), where to begin (`seed`), outwards from there (`spread`), fitted in a
-//!    window that grows (`passes`).
+//! 3. `sheet`: the hung net (`surface`), rays that meet it (`chart`: any lens), lattice coordinates of every pixel (`map`), its fit to what tiles say (`fit`, `alike`),
+//!    and how much of it they support (`model`: flat square, rhomb, quadratic to quartic, by the Bayesian information criterion).
+//! 4. `lock`: the picture summed over tiles along the predicted waves (`demodulate`), phases left over, all harmonics read together (`comb`, `lockin`), where to begin
+//!    (`seed`), outwards from there (`spread`), fitted in a window that grows (`passes`).
 //! 5. `drawing`: the twine as it should look (`template`, `bar`, `polarity`), how much better that explains the picture and how each tile would move it
 //!    (`likelihood`, `compare`): for the true cell, for bright or dark, and for the last digits. `paint`: a net taken out of the picture.
-//! 6. `answer`: the estimate, a probability from statistics that the fit cannot raise (`decision`), names and nodes.
+//! 6. `answer`: the estimate, errors that grow when the model does not fit (`covariance`), all cells on top of each other (`fold`), a probability from statistics
+//!    that the fit cannot raise (`decision`), names and nodes.
 //! 7. `start` puts it all together: a first picture (`cold`, its true cell in `periods`), a next one (`follow`), the end of both (`conclude`), and a net behind the net
 //!    (`layers`).
 //!
-//! `estimator` is the door; `workspace` is what the stages share.
+//! `estimator` is the door; `workspace` is what the stages share, `numeric` small sums and quick functions.
 //!
 //! # Conventions
 //! Frames, pixels and units are those of [`net_geometry`]. Lattice coordinates are in cells. Of a bent net the pose is that of the tangent
@@ -49,6 +49,7 @@ mod drawing;
 mod error;
 mod estimator;
 mod lock;
+mod numeric;
 mod picture;
 mod search;
 mod sheet;

@@ -1,29 +1,30 @@
-//! What the stages of an estimator share: the pyramid, plans, buffers, and the steps that both a cold start and a followed picture take.
+//! What the stages of an estimator share: the pyramid, plans and buffers.
 
 use net_geometry::{Camera, Mesh};
 use net_image::GrayView;
 
 use crate::answer::decision::Evidence;
 use crate::answer::estimate::Followed;
+use crate::answer::fold::Folder;
 use crate::answer::stages::Stages;
 use crate::config::Config;
 use crate::drawing::likelihood::Likelihood;
 use crate::drawing::polarity::Polarity;
 use crate::lock::comb::LOOKS;
-use crate::lock::lockin::{Measurement, Window};
+use crate::lock::demodulate::{Columns, TileSum};
+use crate::lock::lockin::Measurement;
 use crate::lock::seed::{Said, Seed};
 use crate::lock::spread::Spread;
-use crate::picture::demodulate::{Columns, TileSum};
-use crate::picture::fold::Folder;
-use crate::picture::map::PhaseMap;
-use crate::picture::numeric::clip_level;
+use crate::numeric::clip_level;
 use crate::picture::smooth::Smoother;
 use crate::picture::view::{LEVELS, View};
+use crate::picture::window::Window;
 use crate::search::background::Background;
 use crate::search::spectra::{Bank, Spectra};
 use crate::search::table::{Candidate, Scope, Search};
 use crate::sheet::alike::Influence;
 use crate::sheet::fit::{Fitter, Observation, Prior};
+use crate::sheet::map::PhaseMap;
 use crate::sheet::surface::{self, Surface};
 use crate::start::periods::Rival;
 

@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use crate::lock::lockin::{Measurement, Window};
-use crate::picture::fold::Fold;
-use crate::picture::numeric::median;
+use crate::answer::fold::Fold;
+use crate::lock::lockin::Measurement;
+use crate::numeric::median;
+use crate::picture::window::Window;
 
 /// Tiles of which a mean says nothing.
 const FEW: usize = 5;

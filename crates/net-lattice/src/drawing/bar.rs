@@ -78,7 +78,7 @@ fn exp2(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::numeric::erf;
+    use crate::numeric::erf;
 
     #[test]
     fn coverage_is_that_of_a_blurred_bar_and_its_derivative_fits() {

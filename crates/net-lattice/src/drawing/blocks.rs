@@ -2,9 +2,14 @@
 
 use net_image::Image;
 
-use crate::picture::map::Plane;
-use crate::picture::numeric::wrap;
+use crate::numeric::wrap;
 use crate::picture::view::BLOCK;
+use crate::sheet::map::Plane;
+
+/// Pixels of a block.
+pub(crate) const PIXELS: usize = BLOCK * BLOCK;
+/// A number for each of them, row by row.
+pub(crate) type Block = [f32; PIXELS];
 
 /// Sum of a function of the blocks' pixels, eight sums side by side: what the processor adds at once.
 #[inline(always)]
@@ -55,6 +60,3 @@ pub(crate) fn fill_in(blocks: &mut Image<f32>) {
 pub(crate) fn chosen(x: usize, y: usize) -> bool {
     y.is_multiple_of(2) && (x + y / 2).is_multiple_of(2)
 }
-
-pub(crate) const PIXELS: usize = BLOCK * BLOCK;
-pub(crate) type Block = [f32; PIXELS];

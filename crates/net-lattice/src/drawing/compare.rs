@@ -95,7 +95,7 @@ impl Workspace {
             t.likelihood.observe(&surface, &t.map, &drawing, &view.tiles[tiling], &mut t.smoother, &mut t.observations);
             t.scratch.clear();
             t.scratch.extend(t.likelihood.shifts.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()));
-            let scale = (3.0 * 1.4826 * crate::picture::numeric::median(&mut t.scratch)).max(0.01);
+            let scale = (3.0 * 1.4826 * crate::numeric::median(&mut t.scratch)).max(0.01);
             let robust = Robust::Tile(scale);
             for o in &mut t.observations {
                 let w = focus.weight(o.site.pixel);

@@ -7,11 +7,11 @@ use crate::drawing::bar::Bar;
 use crate::drawing::blocks::{Block, PIXELS, chosen, fill_in, positions, total};
 use crate::drawing::polarity::{Polarity, contrasts};
 use crate::drawing::template::{Profile, look_up_all};
-use crate::picture::map::{PhaseMap, Plane};
-use crate::picture::numeric::{log2_rough, magnitude_quantiles, median};
+use crate::numeric::{log2_rough, magnitude_quantiles, median};
 use crate::picture::smooth::Smoother;
 use crate::picture::view::{BLOCK, Level, TileGrid};
 use crate::sheet::fit::Observation;
+use crate::sheet::map::{PhaseMap, Plane};
 use crate::sheet::surface::Surface;
 
 /// How the net is drawn and compared.

@@ -4,10 +4,10 @@
 use net_image::Image;
 
 use crate::drawing::polarity::Polarity;
-use crate::picture::map::{PhaseMap, Plane};
-use crate::picture::numeric::{median, wrap};
+use crate::numeric::{median, wrap};
 use crate::picture::smooth::Smoother;
 use crate::picture::view::{BLOCK, Level};
+use crate::sheet::map::{PhaseMap, Plane};
 
 /// Positions across a twine at which its profile is taken, over [`REACH`] cells to either side.
 const BINS: usize = 48;

@@ -1,6 +1,6 @@
 //! How a twine looks across itself: a bar, blurred, repeated every cell. Tabulated, so that pixel loops need no error function.
 
-use crate::picture::numeric::{erf, log2_rough};
+use crate::numeric::{erf, log2_rough};
 
 /// Positions from the middle of a twine (0) to half a cell.
 const POSITIONS: usize = 256;

@@ -4,8 +4,8 @@
 //! `z_h` of one family in one tile, demodulated at h times the predicted phase, peak together where the lattice is off by `e` cells:
 //! `C(e) = sum_h w_h Re(z_h exp(-2 pi j h e))`, the matched filter for a comb in coloured noise.
 
-use crate::picture::demodulate::TileSum;
-use crate::picture::numeric::median;
+use crate::lock::demodulate::TileSum;
+use crate::numeric::median;
 
 /// Harmonics that are summed.
 pub(crate) const HARMONICS: usize = 4;

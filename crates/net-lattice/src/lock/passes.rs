@@ -1,11 +1,12 @@
 //! Passes of a lock-in over the picture: sums along a sheet, what they say, and the sheet that fits it.
 
 use crate::answer::decision::Evidence;
+use crate::answer::fold::Fold;
 use crate::lock::comb::{Comb, Looks};
-use crate::lock::lockin::{Probe, Window, measure};
+use crate::lock::demodulate::demodulate;
+use crate::lock::lockin::{Probe, measure};
 use crate::lock::seed::Seed;
-use crate::picture::demodulate::demodulate;
-use crate::picture::fold::Fold;
+use crate::picture::window::Window;
 use crate::sheet::fit::{Observation, Robust};
 use crate::sheet::model::Model;
 use crate::sheet::surface::Surface;

@@ -1,7 +1,8 @@
 //! Where a lock-in starts, and how the twine looks there: the sums of the tiles read by every look, and the clearest taken.
 
 use crate::lock::comb::{LOOKS, Looks};
-use crate::lock::lockin::{Measurement, Window};
+use crate::lock::lockin::Measurement;
+use crate::picture::window::Window;
 use crate::sheet::surface::Surface;
 use crate::workspace::Workspace;
 

@@ -4,10 +4,11 @@
 //! to all of it does not curl.
 
 use crate::lock::comb::Comb;
+use crate::lock::demodulate::{Columns, TileSum};
 use crate::lock::lockin::Measurement;
-use crate::picture::demodulate::{Columns, LANES, Strip, TileSum};
-use crate::picture::numeric::Normal;
+use crate::numeric::Normal;
 use crate::picture::view::{BLOCK, Level, TileGrid};
+use crate::sheet::map::{LANES, Strip};
 
 /// Tiles to each side of one whose coordinates foretell its own.
 const REACH: usize = 3;

@@ -2,7 +2,7 @@
 
 use net_image::{Image, widely};
 
-use crate::picture::numeric::magnitude_quantiles;
+use crate::numeric::magnitude_quantiles;
 
 /// Blurs with its buffers kept.
 #[derive(Debug)]

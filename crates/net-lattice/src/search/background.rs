@@ -2,7 +2,7 @@
 
 use net_geometry::nalgebra::{Rotation3, Vector3};
 
-use crate::picture::numeric::median;
+use crate::numeric::median;
 use crate::search::score::score;
 use crate::search::spectra::Bank;
 use crate::search::table::{Candidate, NOTHING, Scope, Search};

@@ -3,7 +3,7 @@
 use net_geometry::nalgebra::Vector3;
 use net_image::widely;
 
-use crate::picture::numeric::log2_rough;
+use crate::numeric::log2_rough;
 use crate::picture::view::Site;
 use crate::search::spectra::{Bank, COLUMNS, HIGHEST, SIZE};
 use crate::search::table::{Candidate, NOTHING, Scope};

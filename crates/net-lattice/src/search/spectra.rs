@@ -8,7 +8,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use crate::picture::numeric::{clip_level, exp2_rough, log2_rough};
+use crate::numeric::{clip_level, exp2_rough, log2_rough};
 use crate::picture::smooth::Smoother;
 use crate::picture::view::{Site, View};
 use crate::search::coarse::{blur_clip, pool};

@@ -1,6 +1,6 @@
 //! Gauss-Newton on tile coordinates: which sheet puts the lattice where the tiles say it is.
 
-use crate::picture::numeric::Normal;
+use crate::numeric::Normal;
 use crate::picture::view::Site;
 use crate::sheet::chart::Point;
 use crate::sheet::surface::{PARAMETERS, Params, Surface};

@@ -81,7 +81,7 @@ pub(crate) fn choose(
 pub(crate) fn robust_scale(whitened: &[f64], scratch: &mut Vec<f64>) -> f64 {
     scratch.clear();
     scratch.extend_from_slice(whitened);
-    let mut s = crate::picture::numeric::median(scratch) + 1e-9;
+    let mut s = crate::numeric::median(scratch) + 1e-9;
     for _ in 0..20 {
         let (mut sum, mut weight) = (0.0, 1e-9);
         for x in whitened {

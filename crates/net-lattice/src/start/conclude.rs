@@ -3,12 +3,12 @@
 use net_geometry::Plane;
 use net_geometry::nalgebra::{Matrix3, Vector3};
 
+use crate::answer::covariance::{self, Doubt};
 use crate::answer::decision::Evidence;
 use crate::answer::estimate::{Labels, LatticeEstimate};
 use crate::config::Config;
-use crate::lock::lockin::Window;
+use crate::picture::window::Window;
 use crate::sheet::alike::REACH_PX;
-use crate::sheet::covariance::{self, Doubt};
 use crate::sheet::model::{self, Model};
 use crate::sheet::surface::Surface;
 use crate::workspace::{Lock, Workspace};

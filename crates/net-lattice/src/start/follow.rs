@@ -4,10 +4,10 @@ use net_geometry::Pose;
 
 use crate::answer::estimate::LatticeEstimate;
 use crate::config::Config;
-use crate::lock::lockin::Window;
 use crate::lock::passes::LOCKED;
 use crate::lock::seed::Seed;
 use crate::picture::smooth::Smoother;
+use crate::picture::window::Window;
 use crate::sheet::chart::Chart;
 use crate::sheet::model::Model;
 use crate::sheet::surface::Surface;

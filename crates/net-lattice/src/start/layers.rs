@@ -12,8 +12,9 @@ use crate::drawing::polarity::contrasts;
 use crate::drawing::template::{Profile, look_up};
 use crate::error::Result;
 use crate::estimator::LatticeEstimator;
-use crate::picture::numeric::wrap;
+use crate::numeric::wrap;
 use crate::picture::view::Level;
+use crate::sheet::chart::Chart;
 use crate::sheet::surface::Surface;
 use crate::workspace::Workspace;
 
@@ -116,7 +117,7 @@ fn same_lattice(first: &Surface, second: &Surface, level: &Level) -> f64 {
     let (a, b) = (first.chart(), second.chart());
     let (mut both, mut same) = (0.0f64, 0.0);
     for site in level.tiles[0].sites.iter().filter(|s| s.valid) {
-        let slopes = |chart: &crate::sheet::chart::Chart| {
+        let slopes = |chart: &Chart| {
             let [p, q, r] = [site.ray, site.next[0], site.next[1]].map(|r| chart.at(r[0], r[1]).map(|p| p.s));
             let (p, q, r) = (p?, q?, r?);
             Some([[q[0] - p[0], r[0] - p[0]], [q[1] - p[1], r[1] - p[1]]])

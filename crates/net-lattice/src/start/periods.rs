@@ -2,8 +2,8 @@
 
 use crate::drawing::polarity::Polarity;
 use crate::lock::comb::Looks;
-use crate::lock::lockin::Window;
 use crate::picture::view::LEVELS;
+use crate::picture::window::Window;
 use crate::sheet::surface::Surface;
 use crate::workspace::{Lock, SMALLEST_CELL, Workspace};
 

@@ -14,9 +14,9 @@ use rustfft::{Fft, FftPlanner};
 use net_image::widely;
 
 use crate::lock::lockin::Measurement;
-use crate::picture::map::{PhaseMap, Plane};
-use crate::picture::numeric::wrap;
+use crate::numeric::wrap;
 use crate::picture::view::{BLOCK, Level, TileGrid};
+use crate::sheet::map::{PhaseMap, Plane};
 
 /// Cells folded side by side.
 const CELLS: usize = 6;

@@ -1,6 +1,5 @@
 //! Lattice coordinates over the whole picture: exact on a grid, interpolated in between.
 
-use crate::picture::demodulate::{LANES, Strip};
 use crate::picture::view::Level;
 use crate::sheet::chart::Chart;
 use crate::sheet::surface::Surface;
@@ -23,6 +22,21 @@ pub(crate) struct Plane {
     pub s: f32,
     pub du: f32,
     pub dv: f32,
+}
+
+/// Blocks side by side.
+pub(crate) const LANES: usize = 8;
+/// A number for each of them.
+pub(crate) type Lanes = [f32; LANES];
+
+/// Lattice coordinates over blocks side by side, of both families: in the middle of each, and their change per px.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Strip {
+    pub s: [Lanes; 2],
+    pub du: [Lanes; 2],
+    pub dv: [Lanes; 2],
+    /// 1 where the sheet is seen, else 0.
+    pub seen: Lanes,
 }
 
 /// Blocks between exact values when the sheet is bent; a cubic fills the rest.

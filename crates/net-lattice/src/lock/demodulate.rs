@@ -6,10 +6,10 @@
 use net_image::widely;
 
 use crate::lock::comb::HARMONICS;
-use crate::lock::lockin::Window;
-use crate::picture::map::PhaseMap;
-use crate::picture::numeric::sin_cos_cycles;
+use crate::numeric::sin_cos_cycles;
 use crate::picture::view::{BLOCK, Level};
+use crate::picture::window::Window;
+use crate::sheet::map::{LANES, Lanes, PhaseMap, Strip};
 
 /// Sums over one tile.
 #[derive(Debug, Clone, Copy, Default)]
@@ -36,21 +36,6 @@ impl TileSum {
             }
         }
     }
-}
-
-/// Blocks side by side.
-pub(crate) const LANES: usize = 8;
-/// A number for each of them.
-pub(crate) type Lanes = [f32; LANES];
-
-/// Lattice coordinates over blocks side by side, of both families: in the middle of each, and their change per px.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Strip {
-    pub s: [Lanes; 2],
-    pub du: [Lanes; 2],
-    pub dv: [Lanes; 2],
-    /// 1 where the sheet is seen, else 0.
-    pub seen: Lanes,
 }
 
 /// Sums over some strips, one below the other.
