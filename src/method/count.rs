@@ -110,10 +110,13 @@ impl CellCount {
             Naming::Sure | Naming::Carried => {}
         }
         let vote = self.vote.update_flat(picture, middle, pixel_from_lattice);
-        let proven = vote.verdict == Verdict::Decided && !contradicts_weakly(&vote, naming);
-        let counted = Counted { proven, ..self.judge(&vote, middle, naming) };
+        let counted = if let Some(other) = weakly_refuted(&vote, naming) {
+            self.begin_as_named(other)
+        } else {
+            Counted { proven: vote.verdict == Verdict::Decided, ..self.judge(&vote, middle, naming) }
+        };
         let in_doubt = counted.connection == Connection::Doubted;
-        if (proven || counted.connection != Connection::Followed) && !in_doubt {
+        if (counted.proven || counted.connection != Connection::Followed) && !in_doubt {
             // Frames in doubt have no place in the map.
             self.vote.remember(&mut self.map);
         }
@@ -146,17 +149,22 @@ impl CellCount {
             // Sure enough without a vote; or the frames before this one were numbered right, or are not in doubt.
             (Naming::Sure, None) | (_, Some((0, 0))) => self.look_up(),
             (Naming::Guess, Some(cells)) if vote.frames == 1 && vote.dropped == 0 => told(cells, Connection::Followed),
-            (Naming::Sure | Naming::Carried, Some(cells)) if contradicts_weakly(vote, naming) => {
-                self.vote.renumber(minus((0, 0), cells));
-                self.restart((0, 0));
-                told((0, 0), Connection::Restarted)
-            }
             // Numbers were given that now prove wrong by whole cells: those go under the old count, these under a new one.
             (_, Some(cells)) => {
                 self.restart((0, 0));
                 Counted { cells_before, ..told(cells, Connection::Restarted) }
             }
         }
+    }
+
+    /// Either the names or the vote that gives `other` ones are wrong: a new count with the names as they are, and nothing is proven.
+    fn begin_as_named(&mut self, other: (i32, i32)) -> Counted {
+        if let Some(doubt) = self.doubt.take() {
+            self.put_aside(doubt.home, (0, 0));
+        }
+        self.vote.renumber(minus((0, 0), other));
+        self.restart((0, 0));
+        told((0, 0), Connection::Restarted)
     }
 
     /// Names are a guess, and the vote is in doubt: the map recognises the place, or more frames have to tell.
@@ -244,10 +252,11 @@ impl CellCount {
     }
 }
 
-/// Whether one look contradicts names that a velocity gave, and no more than that.
-fn contradicts_weakly(vote: &VoteResult, naming: Naming) -> bool {
-    let other = vote.correction().is_some_and(|cells| cells != (0, 0));
-    matches!(naming, Naming::Sure | Naming::Carried) && other && vote.frames == 1 && vote.shifts[0].z < REFUTING_Z
+/// The other names that one look gives to what a velocity has named, if it is sure of them and no more than that.
+fn weakly_refuted(vote: &VoteResult, naming: Naming) -> Option<(i32, i32)> {
+    let weak = vote.frames == 1 && vote.shifts[0].z < REFUTING_Z;
+    let other = vote.correction().filter(|cells| *cells != (0, 0));
+    other.filter(|_| weak && matches!(naming, Naming::Sure | Naming::Carried))
 }
 
 fn told(cells: (i32, i32), connection: Connection) -> Counted {
