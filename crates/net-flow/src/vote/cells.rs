@@ -3,8 +3,10 @@
 use nalgebra::Vector2;
 use net_image::{GrayView, Pyramid};
 
+use super::second::SecondLattice;
+
 /// Samples along a cell's side.
-const SIDE: usize = 12;
+pub(super) const SIDE: usize = 12;
 /// Numbers of a cell.
 pub(super) const CELL: usize = SIDE * SIDE;
 /// Cells either way whose mean is the lattice.
@@ -69,6 +71,7 @@ pub(super) struct Layout {
     raw: Vec<[f32; CELL]>,
     deviations: Vec<f32>,
     sorted: Vec<f32>,
+    second: SecondLattice,
 }
 
 impl Layout {
@@ -82,6 +85,7 @@ impl Layout {
             raw: vec![[0.0; CELL]; n],
             deviations: vec![0.0; n],
             sorted: Vec::with_capacity(n),
+            second: SecondLattice::new(columns, rows),
         }
     }
 
@@ -186,6 +190,10 @@ impl Layout {
             let patch = &mut cells.patches[k];
             // Outliers are cut, and then every cell has one voice.
             patch.iter_mut().for_each(|x| *x = (*x / typical).clamp(-3.0, 3.0));
+        }
+        self.second.remove(&mut cells.patches, &cells.valid);
+        for k in (0..columns * rows).filter(|&k| cells.valid[k]) {
+            let patch = &mut cells.patches[k];
             let norm = dot(patch, patch).sqrt().max(1e-6);
             patch.iter_mut().for_each(|x| *x /= norm);
         }

@@ -12,6 +12,7 @@ mod cells;
 mod evidence;
 mod recall;
 mod score;
+mod second;
 
 use nalgebra::Vector2;
 use net_image::{GrayView, Pyramid};
