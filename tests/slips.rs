@@ -9,15 +9,30 @@ use sequence::{KINDS, Tally, run, sequence};
 /// Frames of a sequence: its path depends on how long it is.
 const FRAMES: u32 = 50;
 
+/// Follows the sequence; no slip, and little said to be in doubt: to say nothing would be no answer.
+fn counts(name: &str, seed: u64) {
+    let kind = KINDS.iter().position(|kind| *kind == name).expect("a kind");
+    let mut tally = Tally::default();
+    run(&sequence(kind, FRAMES, seed), 1, &mut tally).expect("a simulated sequence");
+    assert_eq!((tally.frames, tally.silent), (FRAMES, 0), "{name} {seed}: {tally:?}");
+    assert!(tally.refused == 0 && tally.flagged <= FRAMES / 5, "{name} {seed}: {tally:?}");
+}
+
 #[test]
 fn one_weak_look_does_not_rename_what_a_velocity_named() {
     // Of fourteen thousand frames of such sequences, none with a slip but these two: the vote refuted right names by 6.4 and by 5.1 deviations.
-    for (name, seed) in [("bare", 7012), ("fish", 7119)] {
-        let kind = KINDS.iter().position(|kind| *kind == name).expect("a kind");
-        let mut tally = Tally::default();
-        run(&sequence(kind, FRAMES, seed), 1, &mut tally).expect("a simulated sequence");
-        assert_eq!((tally.frames, tally.silent), (FRAMES, 0), "{name} {seed}: {tally:?}");
-        // To say nothing would be no answer: a count of four in five frames goes on.
-        assert!(tally.refused == 0 && tally.flagged <= FRAMES / 5, "{name} {seed}: {tally:?}");
-    }
+    counts("bare", 7012);
+    counts("fish", 7119);
+}
+
+#[test]
+fn the_lattice_of_a_net_behind_does_not_vote() {
+    // It moved past at nearly a whole cell a frame; after 37 frames in doubt the vote took it for the net's own motion, and was followed.
+    counts("behind", 7333);
+}
+
+#[test]
+fn a_frame_that_vote_and_velocity_name_otherwise_is_not_recognised_again() {
+    // Four frames later its place in the map renamed the count by a cell.
+    counts("fish", 7342);
 }

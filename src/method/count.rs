@@ -110,14 +110,15 @@ impl CellCount {
             Naming::Sure | Naming::Carried => {}
         }
         let vote = self.vote.update_flat(picture, middle, pixel_from_lattice);
-        let counted = if let Some(other) = weakly_refuted(&vote, naming) {
+        let refuted = weakly_refuted(&vote, naming);
+        let counted = if let Some(other) = refuted {
             self.begin_as_named(other)
         } else {
             Counted { proven: vote.verdict == Verdict::Decided, ..self.judge(&vote, middle, naming) }
         };
-        let in_doubt = counted.connection == Connection::Doubted;
-        if (counted.proven || counted.connection != Connection::Followed) && !in_doubt {
-            // Frames in doubt have no place in the map.
+        // Frames in doubt have no place in the map, nor has one of which the vote and a velocity say different things.
+        let certain = self.doubt.is_none() && refuted.is_none();
+        if certain && (counted.proven || counted.connection != Connection::Followed) {
             self.vote.remember(&mut self.map);
         }
         self.middle = plus(middle, counted.cells);
@@ -125,10 +126,11 @@ impl CellCount {
     }
 
     fn judge(&mut self, vote: &VoteResult, middle: (i32, i32), naming: Naming) -> Counted {
-        let whole = naming == Naming::Carried && vote.dropped == 0;
         let doubt = self.doubt.take();
         let doubt = doubt.filter(|d| {
-            let goes_on = whole && vote.frames == d.frames + 1;
+            let undecided = vote.verdict == Verdict::Ambiguous;
+            let goes_on =
+                naming == Naming::Carried && if vote.dropped == 0 { vote.frames == d.frames + 1 } else { undecided };
             if !goes_on {
                 // The last frame in doubt is where the count goes on from.
                 self.put_aside(d.home, (0, 0));
@@ -180,7 +182,12 @@ impl CellCount {
             self.begin();
             return Counted { in_doubt: frames, ..told((0, 0), Connection::Doubted) };
         }
-        self.put_aside(home, (0, 0));
+        if doubt.is_some() {
+            // It outlasts the vote's memory: how these frames go on from those before it will not be known, unless the map recognises the place.
+            self.doubt = doubt;
+        } else {
+            self.put_aside(home, (0, 0));
+        }
         self.begin();
         told((0, 0), Connection::Restarted)
     }
