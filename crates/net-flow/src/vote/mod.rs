@@ -1,6 +1,6 @@
 //! The vote: by how many whole cells has the net moved, judged by what does *not* repeat.
 //!
-//! The picture is laid out cell by cell in lattice coordinates, the lattice itself is subtracted, and what is left (bow and jitter of the twine, growth,
+//! The picture is laid out cell by cell in lattice coordinates, the lattice itself is subtracted, that of a second net cut down, and what is left (bow and jitter of the twine, growth,
 //! broken meshes) is compared with the frame before, moved by every whole shift in reach. The right shift stands out from the others by many of their deviations.
 //! Where it does not, evidence is added up over frames, since a velocity that is wrong by a cell a frame is wrong by the same cell every time; until it
 //! suffices the answer is *ambiguous*, with the rivals.
