@@ -95,12 +95,13 @@ impl CellCount {
         self.track
     }
 
-    /// The next frame with a pose, flattened: the cell at its optical axis, how its nodes were named, and where they are.
+    /// The next frame with a pose, flattened: the cell at its optical axis, how its nodes were named, whether the frame before had a pose, and where the nodes are.
     pub fn update(
         &mut self,
         picture: &Pyramid,
         middle: (i32, i32),
         naming: Naming,
+        gapless: bool,
         pixel_from_lattice: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Counted {
         match naming {
@@ -114,7 +115,7 @@ impl CellCount {
         let counted = if let Some(other) = refuted {
             self.begin_as_named(other)
         } else {
-            Counted { proven: vote.verdict == Verdict::Decided, ..self.judge(&vote, middle, naming) }
+            Counted { proven: vote.verdict == Verdict::Decided, ..self.judge(&vote, middle, naming, gapless) }
         };
         // Frames in doubt have no place in the map, nor has one of which the vote and a velocity say different things.
         let certain = self.doubt.is_none() && refuted.is_none();
@@ -125,7 +126,7 @@ impl CellCount {
         counted
     }
 
-    fn judge(&mut self, vote: &VoteResult, middle: (i32, i32), naming: Naming) -> Counted {
+    fn judge(&mut self, vote: &VoteResult, middle: (i32, i32), naming: Naming, gapless: bool) -> Counted {
         let doubt = self.doubt.take();
         let doubt = doubt.filter(|d| {
             let undecided = vote.verdict == Verdict::Ambiguous;
@@ -147,7 +148,7 @@ impl CellCount {
         }
         match (naming, vote.correction()) {
             (Naming::New, _) => self.find_or_restart(minus(self.middle, middle)),
-            (Naming::Guess | Naming::Carried, None) => self.find_or_doubt(vote, doubt),
+            (Naming::Guess | Naming::Carried, None) => self.find_or_doubt(vote, doubt, gapless),
             // Sure enough without a vote; or the frames before this one were numbered right, or are not in doubt.
             (Naming::Sure, None) | (_, Some((0, 0))) => self.look_up(),
             (Naming::Guess, Some(cells)) if vote.frames == 1 && vote.dropped == 0 => told(cells, Connection::Followed),
@@ -170,14 +171,17 @@ impl CellCount {
     }
 
     /// Names are a guess, and the vote is in doubt: the map recognises the place, or more frames have to tell.
-    fn find_or_doubt(&mut self, vote: &VoteResult, doubt: Option<Doubt>) -> Counted {
+    fn find_or_doubt(&mut self, vote: &VoteResult, doubt: Option<Doubt>, gapless: bool) -> Counted {
         if let Some(counted) = self.find((0, 0)) {
             self.track = doubt.map_or(self.track, |d| d.home);
             return counted;
         }
         let home = doubt.map_or(self.track, |d| d.home);
         let frames = doubt.map_or(0, |d| d.frames) + 1;
-        if vote.verdict == Verdict::Ambiguous && vote.dropped == 0 && vote.frames == frames {
+        if !gapless {
+            // What a velocity is off by adds up over a gap: more than in each of the frames after it, whose evidence would not tell.
+            self.vote.drop_doubt();
+        } else if vote.verdict == Verdict::Ambiguous && vote.dropped == 0 && vote.frames == frames {
             self.doubt = Some(Doubt { home, frames });
             self.begin();
             return Counted { in_doubt: frames, ..told((0, 0), Connection::Doubted) };
@@ -276,4 +280,33 @@ fn plus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
 
 fn minus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
     (a.0.saturating_sub(b.0), a.1.saturating_sub(b.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use net_flow::vote::ShiftScore;
+
+    use super::*;
+
+    #[test]
+    fn one_weak_look_does_not_rename_what_a_velocity_named() {
+        let vote = |z: f64, frames: u32, cells: (i32, i32)| VoteResult {
+            verdict: Verdict::Decided,
+            frames,
+            dropped: 0,
+            shifts: [ShiftScore { cells, z }; net_flow::vote::LISTED],
+            log_odds: 0.0,
+            compared: 200,
+        };
+        // Looks that were sure of a wrong shift had 6.4 and 5.1 deviations.
+        let weak = vote(6.4, 1, (0, -1));
+        assert_eq!(weakly_refuted(&weak, Naming::Sure), Some((0, -1)));
+        assert_eq!(weakly_refuted(&weak, Naming::Carried), Some((0, -1)));
+        assert_eq!(weakly_refuted(&weak, Naming::Guess), None, "a guess may be renamed");
+        assert_eq!(weakly_refuted(&vote(8.5, 1, (0, -1)), Naming::Sure), None, "a strong look");
+        assert_eq!(weakly_refuted(&vote(6.4, 3, (0, -1)), Naming::Carried), None, "three looks");
+        assert_eq!(weakly_refuted(&vote(6.4, 1, (0, 0)), Naming::Sure), None, "confirmed");
+        let undecided = VoteResult { verdict: Verdict::Ambiguous, ..weak };
+        assert_eq!(weakly_refuted(&undecided, Naming::Sure), None);
+    }
 }

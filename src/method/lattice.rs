@@ -235,8 +235,8 @@ impl LatticeMethod {
         let camera = self.estimator.camera();
         self.knots.fill(junctions, |ij| estimate.pixel_from_lattice(camera, ij).map(|(pixel, _)| pixel));
         let middle = SheetMap { estimate, camera }.seed().unwrap_or_default();
-        let knots = &self.knots;
-        let counted = self.count.update(self.flow.picture(), middle, naming, |ij| knots.pixel(ij));
+        let (knots, gapless) = (&self.knots, self.gapless());
+        let counted = self.count.update(self.flow.picture(), middle, naming, gapless, |ij| knots.pixel(ij));
         match counted.connection {
             Connection::Followed => {}
             // Names go on by the best guess. So does the velocity: it makes better guesses, but is none to rely on.
