@@ -1,4 +1,4 @@
-//! Sequences in which the count of cells slipped in silence, before one weak look of the vote was kept from renaming what a velocity had named.
+//! Sequences in which the count of cells slipped in silence, each before something was changed that keeps its kind from it.
 
 #[path = "../examples/counting/sequence.rs"]
 #[allow(dead_code)]
@@ -19,7 +19,7 @@ fn counts(name: &str, seed: u64) {
 }
 
 #[test]
-fn one_weak_look_does_not_rename_what_a_velocity_named() {
+fn names_that_are_right_are_not_renamed() {
     // The vote refuted right names by 6.4 and by 5.1 deviations; since waves are cut it no longer does.
     counts("bare", 7012);
     counts("fish", 7119);

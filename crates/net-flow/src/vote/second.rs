@@ -52,10 +52,11 @@ impl SecondLattice {
     /// Takes strong waves out of the cells that take part; of the others nothing is known.
     pub(super) fn remove(&mut self, patches: &mut [[f32; CELL]], valid: &[bool]) {
         let (width, height) = (self.columns * SIDE, self.rows * SIDE);
+        let columns = self.columns;
+        let place = |k: usize, v: usize| (k / columns * SIDE + v) * width + k % columns * SIDE;
         for (k, (patch, valid)) in patches.iter().zip(valid).enumerate() {
-            let corner = k / self.columns * SIDE * width + k % self.columns * SIDE;
             for (v, row) in patch.as_chunks::<SIDE>().0.iter().enumerate() {
-                let out = &mut self.by_rows[corner + v * width..][..SIDE];
+                let out = &mut self.by_rows[place(k, v)..][..SIDE];
                 out.iter_mut().zip(row).for_each(|(o, x)| *o = Complex32::new(if *valid { *x } else { 0.0 }, 0.0));
             }
         }
@@ -76,9 +77,8 @@ impl SecondLattice {
         self.along_rows[1].process_with_scratch(&mut self.by_rows, &mut self.scratch);
         let scale = 1.0 / (width * height) as f32;
         for (k, (patch, valid)) in patches.iter_mut().zip(valid).enumerate() {
-            let corner = k / self.columns * SIDE * width + k % self.columns * SIDE;
             for (v, row) in patch.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
-                let from = &self.by_rows[corner + v * width..][..SIDE];
+                let from = &self.by_rows[place(k, v)..][..SIDE];
                 row.iter_mut().zip(from).for_each(|(x, w)| *x = if *valid { w.re * scale } else { 0.0 });
             }
         }
