@@ -64,6 +64,16 @@ impl<'a, T: Copy> View<'a, T> {
     pub fn get(&self, u: usize, v: usize) -> Option<T> {
         (u < self.width && v < self.height).then(|| self.data[v * self.stride + u])
     }
+    /// The two by two values of which the top-left one is `(u, v)`, row by row; `None` if one of them is outside.
+    #[inline]
+    pub fn square(&self, u: usize, v: usize) -> Option<[[T; 2]; 2]> {
+        if u >= self.width - 1 || v >= self.height - 1 {
+            return None;
+        }
+        let at = v * self.stride + u;
+        let pair = |at: usize| self.data.get(at..)?.first_chunk().copied();
+        Some([pair(at)?, pair(at + self.stride)?])
+    }
     /// The part of `width` x `height` px whose top-left pixel is `(u, v)`; `None` if it does not lie inside.
     pub fn crop(&self, u: usize, v: usize, width: usize, height: usize) -> Option<Self> {
         if width == 0 || height == 0 || u.checked_add(width)? > self.width || v.checked_add(height)? > self.height {

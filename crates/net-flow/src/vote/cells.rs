@@ -1,9 +1,10 @@
 //! The picture cell by cell, its lattice subtracted.
 
 use nalgebra::Vector2;
-use net_image::{GrayView, Pyramid};
+use net_image::Pyramid;
 
-use super::second::SecondLattice;
+use super::sample::sample;
+use super::second_lattice::SecondLattice;
 
 /// Samples along a cell's side.
 pub(super) const SIDE: usize = 12;
@@ -200,29 +201,6 @@ impl Layout {
     }
 }
 
-/// Samples a cell whose corners, middles of sides and middle lie at `place`s, 0 to 2 along either side: the quarters belong to four meshes, in each of which a lattice laid out by its
-/// knots is bilinear. `None` where some of it is outside.
-fn sample(
-    view: GrayView<'_>,
-    place: impl Fn(usize, usize) -> Option<Vector2<f64>>,
-    out: &mut [f32; CELL],
-) -> Option<()> {
-    const HALF: usize = SIDE / 2;
-    let part = |x: usize| (x as f64 + 0.5) / HALF as f64;
-    for b in 0..2 {
-        let (top, bottom) =
-            ([place(0, b)?, place(1, b)?, place(2, b)?], [place(0, b + 1)?, place(1, b + 1)?, place(2, b + 1)?]);
-        for y in 0..HALF {
-            let row: [_; 3] = std::array::from_fn(|a| top[a].lerp(&bottom[a], part(y)));
-            for x in 0..SIDE {
-                let p = row[x / HALF].lerp(&row[x / HALF + 1], part(x % HALF));
-                out[(b * HALF + y) * SIDE + x] = net_image::bilinear(view, p.x, p.y)?;
-            }
-        }
-    }
-    Some(())
-}
-
 /// Mean of the middle of a cell.
 fn knot(cell: &[f32; CELL]) -> f32 {
     const MIDDLE: std::ops::Range<usize> = SIDE / 2 - 2..SIDE / 2 + 2;
@@ -230,6 +208,7 @@ fn knot(cell: &[f32; CELL]) -> f32 {
 }
 
 /// Sum of products in eight lanes.
+#[inline(always)]
 pub(super) fn dot(a: &[f32; CELL], b: &[f32; CELL]) -> f32 {
     let mut lanes = [0.0f32; 8];
     for (a, b) in a.as_chunks::<8>().0.iter().zip(b.as_chunks::<8>().0) {

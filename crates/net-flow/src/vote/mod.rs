@@ -11,8 +11,9 @@
 mod cells;
 mod evidence;
 mod recall;
+mod sample;
 mod score;
-mod second;
+mod second_lattice;
 
 use nalgebra::Vector2;
 use net_image::{GrayView, Pyramid};

@@ -1,5 +1,7 @@
 //! How well each whole shift fits.
 
+use net_image::widely;
+
 use super::cells::{Cells, MIN_CELLS, dot};
 
 /// Blocks of the common cells, across and down: their median is deaf to a fish that covers two of them.
@@ -41,19 +43,7 @@ impl Scores {
 
     /// Compares `here`, moved by every shift, with `before`. Cells common at no shift.
     pub(super) fn compare(&mut self, before: &Cells, here: &Cells) -> usize {
-        self.patch.clear();
-        self.knot.clear();
-        let mut compared = 0;
-        for dj in -self.reach..=self.reach {
-            for di in -self.reach..=self.reach {
-                let (count, patch, knot) = one(before, here, (di, dj));
-                if (di, dj) == (0, 0) {
-                    compared = count;
-                }
-                self.patch.push(patch);
-                self.knot.push(knot);
-            }
-        }
+        let compared = all(self, before, here);
         standardise(&mut self.patch, &mut self.sorted);
         standardise(&mut self.knot, &mut self.sorted);
         self.z.clear();
@@ -66,7 +56,28 @@ impl Scores {
     }
 }
 
+widely! {
+    /// Compares at every shift. Cells common at none.
+    fn all<'a>(scores: &'a mut Scores, before: &'a Cells, here: &'a Cells) -> usize {
+        scores.patch.clear();
+        scores.knot.clear();
+        let mut compared = 0;
+        for dj in -scores.reach..=scores.reach {
+            for di in -scores.reach..=scores.reach {
+                let (count, patch, knot) = one(before, here, (di, dj));
+                if (di, dj) == (0, 0) {
+                    compared = count;
+                }
+                scores.patch.push(patch);
+                scores.knot.push(knot);
+            }
+        }
+        compared
+    }
+}
+
 /// Common cells, median over blocks of the mean correlation of patches, and correlation of the knots' brightness.
+#[inline(always)]
 fn one(before: &Cells, here: &Cells, shift: (i32, i32)) -> (usize, Option<f64>, Option<f64>) {
     let offset = |here: i32, shift: i32, before: i32| i64::from(here) + i64::from(shift) - i64::from(before);
     let offset = (offset(here.corner.0, shift.0, before.corner.0), offset(here.corner.1, shift.1, before.corner.1));

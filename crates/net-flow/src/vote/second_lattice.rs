@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
@@ -15,10 +16,12 @@ const STRONG: f32 = 1.5;
 pub(super) struct SecondLattice {
     columns: usize,
     rows: usize,
-    /// Forth and back along the rows, and along the columns.
-    along_rows: [Arc<dyn Fft<f32>>; 2],
+    /// The picture is real: of the other half of the waves each is the conjugate of one of these.
+    along_rows: (Arc<dyn RealToComplex<f32>>, Arc<dyn ComplexToReal<f32>>),
+    /// Forth and back.
     along_columns: [Arc<dyn Fft<f32>>; 2],
-    by_rows: Vec<Complex32>,
+    picture: Vec<f32>,
+    row: Vec<Complex32>,
     by_columns: Vec<Complex32>,
     scratch: Vec<Complex32>,
     sorted: Vec<f32>,
@@ -32,18 +35,22 @@ impl std::fmt::Debug for SecondLattice {
 
 impl SecondLattice {
     pub(super) fn new(columns: usize, rows: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let mut both = |n: usize| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)];
-        let (along_rows, along_columns) = (both(columns * SIDE), both(rows * SIDE));
-        let scratch = along_rows.iter().chain(&along_columns).map(|f| f.get_inplace_scratch_len()).max().unwrap_or(0);
-        let zero = Complex32::new(0.0, 0.0);
+        let (width, height) = (columns * SIDE, rows * SIDE);
+        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
+        let along_rows = (real.plan_fft_forward(width), real.plan_fft_inverse(width));
+        let along_columns = [complex.plan_fft_forward(height), complex.plan_fft_inverse(height)];
+        let scratch = along_columns.iter().map(|f| f.get_inplace_scratch_len());
+        let scratch =
+            scratch.chain([along_rows.0.get_scratch_len(), along_rows.1.get_scratch_len()]).max().unwrap_or(0);
+        let (zero, waves) = (Complex32::new(0.0, 0.0), width / 2 + 1);
         Self {
             columns,
             rows,
             along_rows,
             along_columns,
-            by_rows: vec![zero; columns * rows * CELL],
-            by_columns: vec![zero; (columns * SIDE / 2 + 1) * rows * SIDE],
+            picture: vec![0.0; width * height],
+            row: vec![zero; waves],
+            by_columns: vec![zero; waves * height],
             scratch: vec![zero; scratch],
             sorted: Vec::with_capacity(columns * rows),
         }
@@ -51,35 +58,31 @@ impl SecondLattice {
 
     /// Takes strong waves out of the cells that take part; of the others nothing is known.
     pub(super) fn remove(&mut self, patches: &mut [[f32; CELL]], valid: &[bool]) {
-        let (width, height) = (self.columns * SIDE, self.rows * SIDE);
-        let columns = self.columns;
+        let (width, height, columns) = (self.columns * SIDE, self.rows * SIDE, self.columns);
         let place = |k: usize, v: usize| (k / columns * SIDE + v) * width + k % columns * SIDE;
         for (k, (patch, valid)) in patches.iter().zip(valid).enumerate() {
             for (v, row) in patch.as_chunks::<SIDE>().0.iter().enumerate() {
-                let out = &mut self.by_rows[place(k, v)..][..SIDE];
-                out.iter_mut().zip(row).for_each(|(o, x)| *o = Complex32::new(if *valid { *x } else { 0.0 }, 0.0));
+                let out = &mut self.picture[place(k, v)..][..SIDE];
+                if *valid { out.copy_from_slice(row) } else { out.fill(0.0) }
             }
         }
-        self.along_rows[0].process_with_scratch(&mut self.by_rows, &mut self.scratch);
-        // The picture is real: of the other half of the waves each is the conjugate of one of these.
-        let half = width / 2 + 1;
-        for (x, column) in self.by_columns.chunks_exact_mut(height).enumerate() {
-            column.iter_mut().zip(self.by_rows[x..].iter().step_by(width)).for_each(|(to, from)| *to = *from);
+        // Lengths are those that were planned for, and what is no picture's spectrum by a rounding error is taken for one.
+        for (y, pixels) in self.picture.chunks_exact_mut(width).enumerate() {
+            let _ = self.along_rows.0.process_with_scratch(pixels, &mut self.row, &mut self.scratch);
+            self.by_columns[y..].iter_mut().step_by(height).zip(&self.row).for_each(|(to, from)| *to = *from);
         }
         self.along_columns[0].process_with_scratch(&mut self.by_columns, &mut self.scratch);
         self.cut(height);
         self.along_columns[1].process_with_scratch(&mut self.by_columns, &mut self.scratch);
-        for (y, row) in self.by_rows.chunks_exact_mut(width).enumerate() {
-            let (first, second) = row.split_at_mut(half);
-            first.iter_mut().zip(self.by_columns[y..].iter().step_by(height)).for_each(|(to, from)| *to = *from);
-            second.iter_mut().rev().zip(&first[1..]).for_each(|(to, from)| *to = from.conj());
+        for (y, pixels) in self.picture.chunks_exact_mut(width).enumerate() {
+            self.row.iter_mut().zip(self.by_columns[y..].iter().step_by(height)).for_each(|(to, from)| *to = *from);
+            let _ = self.along_rows.1.process_with_scratch(&mut self.row, pixels, &mut self.scratch);
         }
-        self.along_rows[1].process_with_scratch(&mut self.by_rows, &mut self.scratch);
         let scale = 1.0 / (width * height) as f32;
         for (k, (patch, valid)) in patches.iter_mut().zip(valid).enumerate() {
+            let scale = if *valid { scale } else { 0.0 };
             for (v, row) in patch.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
-                let from = &self.by_rows[place(k, v)..][..SIDE];
-                row.iter_mut().zip(from).for_each(|(x, w)| *x = if *valid { w.re * scale } else { 0.0 });
+                row.iter_mut().zip(&self.picture[place(k, v)..][..SIDE]).for_each(|(x, w)| *x = scale * w);
             }
         }
     }
@@ -89,16 +92,19 @@ impl SecondLattice {
         let (columns, rows) = (self.columns, self.rows);
         for square in 0..CELL / 2 {
             let (a, b) = (square / SIDE * columns, square % SIDE * rows);
-            let place = |k: usize| (a + k / rows) * height + b + k % rows;
+            let waves = &mut self.by_columns[a * height..][..columns * height];
             self.sorted.clear();
-            self.sorted.extend((0..columns * rows).map(|k| self.by_columns[place(k)].norm_sqr()));
+            for column in waves.chunks_exact(height) {
+                self.sorted.extend(column[b..][..rows].iter().map(|wave| wave.norm_sqr()));
+            }
             let middle = self.sorted.len() / 2;
             let most = STRONG * STRONG * *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
-            for k in 0..columns * rows {
-                let wave = &mut self.by_columns[place(k)];
-                let power = wave.norm_sqr();
-                if power > most {
-                    *wave *= (most / power).sqrt();
+            for column in waves.chunks_exact_mut(height) {
+                for wave in &mut column[b..][..rows] {
+                    let power = wave.norm_sqr();
+                    if power > most {
+                        *wave *= (most / power).sqrt();
+                    }
                 }
             }
         }
