@@ -8,9 +8,13 @@ use crate::view::View;
 pub fn bilinear<T: Pixel>(image: View<'_, T>, u: f64, v: f64) -> Option<f32> {
     let (u, x) = split(u, image.width())?;
     let (v, y) = split(v, image.height())?;
-    let (top, bottom) = (image.row(v), image.row((v + 1).min(image.height() - 1)));
+    let along = |[a, b]: [T; 2]| lerp(a.to_f32(), b.to_f32(), x);
+    if let Some([top, bottom]) = image.square(u, v) {
+        return Some(lerp(along(top), along(bottom), y));
+    }
+    // At the image's end.
     let right = (u + 1).min(image.width() - 1);
-    let along = |row: &[T]| lerp(row[u].to_f32(), row[right].to_f32(), x);
+    let [top, bottom] = [v, (v + 1).min(image.height() - 1)].map(|v| [image.row(v)[u], image.row(v)[right]]);
     Some(lerp(along(top), along(bottom), y))
 }
 

@@ -71,6 +71,7 @@ impl Appearance {
         let padded = self.padded();
         let Self { rows, block_sums, sum, templates, energies, .. } = self;
         graph.blocks.sum_members(row_width, |e| rows.get(e * row_width..)?.get(..row_width), block_sums);
+        graph.blocks.sum_neighbours(row_width, block_sums, sum);
         templates.clear();
         templates.resize(graph.blocks.count() * padded, 0.0);
         energies.clear();
@@ -80,7 +81,7 @@ impl Appearance {
             if graph.blocks.members(block).is_empty() {
                 continue;
             }
-            graph.blocks.sum_around(block, row_width, block_sums, sum);
+            let sum = &block_sums[block * row_width..][..row_width];
             let share = 1.0 / sum[width].max(1.0);
             template.iter_mut().zip(sum.iter()).for_each(|(t, s)| *t = share * s);
             remove_line(template);

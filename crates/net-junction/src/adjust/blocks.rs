@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use net_image::widely;
+use wide::f32x8;
 
 use crate::adjust::graph::{Edge, Node};
-use crate::adjust::lanes::LANES;
 
 /// Cells along a block's side.
 const SIDE: i32 = 3;
@@ -101,13 +101,11 @@ impl Blocks {
         }
     }
 
-    /// The sum of blocks' rows around a block.
-    pub fn sum_around(&self, block: usize, width: usize, sums: &[f32], out: &mut Vec<f32>) {
-        out.clear();
-        out.resize(width, 0.0);
-        for near in self.around(block).into_iter().flatten() {
-            out.iter_mut().zip(&sums[near * width..][..width]).for_each(|(o, s)| *o += s);
-        }
+    /// Adds to each block's row of `width` values those of the blocks around it.
+    pub fn sum_neighbours(&self, width: usize, sums: &mut Vec<f32>, scratch: &mut Vec<f32>) {
+        let line = self.rows * width;
+        add_beside(sums, scratch, line, width);
+        add_beside(sums, scratch, self.columns * line, line);
     }
 
     /// The four blocks of the same family beside a block.
@@ -134,6 +132,18 @@ impl Blocks {
 }
 
 widely! {
+    /// Adds to each value of a line those that are `step` values before and after it in the same line.
+    fn add_beside<'a>(sums: &'a mut Vec<f32>, own: &'a mut Vec<f32>, line: usize, step: usize) -> () {
+        own.clone_from(sums);
+        for (sums, own) in sums.chunks_exact_mut(line.max(1)).zip(own.chunks_exact(line.max(1))) {
+            let Some(rest) = line.checked_sub(step) else { continue };
+            sums[step..].iter_mut().zip(&own[..rest]).for_each(|(s, o)| *s += o);
+            sums[..rest].iter_mut().zip(&own[step..]).for_each(|(s, o)| *s += o);
+        }
+    }
+}
+
+widely! {
     /// Upper median of the members' values around each block.
     fn medians_around<'a>(blocks: &'a Blocks, values: &'a [f32], scratch: &'a mut Vec<f32>, out: &'a mut Vec<f32>) -> () {
         out.clear();
@@ -156,13 +166,16 @@ widely! {
     }
 }
 
-/// Values that are left to be told apart one by one, and how many halvings get there unless some values are thousands of times the others.
-const FEW: usize = 8;
-const HALVINGS: usize = 24;
+/// How many halvings tell values apart unless some are thousands of times the others.
+const HALVINGS: usize = 32;
+/// So many values are counted at once.
+const COUNTED: usize = 32;
 
 /// Upper median of what are numbers; reorders. Halves the range in which it must be, for values are counted faster than they are sorted.
 #[inline(always)]
 fn upper_median(values: &mut Vec<f32>) -> Option<f32> {
+    // No number is no larger than any, and whole vectors are counted.
+    values.resize(values.len().next_multiple_of(COUNTED), f32::NAN);
     let (mut low, mut high) = least_and_most(values);
     let (mut below, mut up) = (up_to(values, low), up_to(values, high));
     let rank = up / 2;
@@ -171,8 +184,11 @@ fn upper_median(values: &mut Vec<f32>) -> Option<f32> {
     }
     // Above `low`, at most `high`: so many are no larger than each.
     for _ in 0..HALVINGS {
-        if up - below <= FEW as u32 {
-            return Some(among_few(values, low, high, rank - below));
+        if rank == below {
+            return Some(extreme(values, low, high, false));
+        }
+        if rank + 1 == up {
+            return Some(extreme(values, low, high, true));
         }
         let middle = 0.5 * (low + high);
         let count = up_to(values, middle);
@@ -186,40 +202,40 @@ fn upper_median(values: &mut Vec<f32>) -> Option<f32> {
     Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
-/// The value of this rank of those above `low` and at most `high`, which are few.
+/// The least or the most of the values above `low` and at most `high`.
 #[inline(always)]
-fn among_few(values: &[f32], low: f32, high: f32, rank: u32) -> f32 {
-    let (mut few, mut count) = ([f32::INFINITY; FEW + 1], 0);
-    for &value in values {
-        few[count.min(FEW)] = value;
-        count += usize::from(value > low && value <= high);
+fn extreme(values: &[f32], low: f32, high: f32, most: bool) -> f32 {
+    let sign = if most { -1.0 } else { 1.0 };
+    let (mut least, sign, low, high) =
+        (f32x8::splat(f32::INFINITY), f32x8::splat(sign), f32x8::splat(low), f32x8::splat(high));
+    for vector in values.as_chunks().0 {
+        let value = f32x8::from(*vector);
+        let better = value.simd_gt(low) & value.simd_le(high) & (value * sign).simd_lt(least);
+        least = better.select(value * sign, least);
     }
-    few[count.min(FEW)] = f32::INFINITY;
-    let few = few.first_chunk::<FEW>().copied().unwrap_or([high; FEW]);
-    let enough = |v: &f32| few.iter().map(|w| u32::from(w <= v)).sum::<u32>() > rank;
-    few.iter().map(|v| if enough(v) { *v } else { f32::INFINITY }).fold(f32::INFINITY, f32::min)
+    sign.to_array()[0] * least.to_array().into_iter().fold(f32::INFINITY, f32::min)
 }
 
-/// Least and largest value.
+/// Least and largest of the values of whole vectors.
 #[inline(always)]
 fn least_and_most(values: &[f32]) -> (f32, f32) {
-    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    let (vectors, rest) = values.as_chunks::<LANES>();
-    for vector in vectors {
-        for k in 0..LANES {
-            // False for NaN.
-            low[k] = if vector[k] < low[k] { vector[k] } else { low[k] };
-            high[k] = if vector[k] > high[k] { vector[k] } else { high[k] };
-        }
+    let (mut low, mut high) = (f32x8::splat(f32::INFINITY), f32x8::splat(f32::NEG_INFINITY));
+    for vector in values.as_chunks().0 {
+        let value = f32x8::from(*vector);
+        // False for NaN.
+        low = value.simd_lt(low).select(value, low);
+        high = value.simd_gt(high).select(value, high);
     }
-    let all = |lanes: [f32; LANES]| lanes.into_iter().chain(rest.iter().copied());
-    (all(low).fold(f32::INFINITY, f32::min), all(high).fold(f32::NEG_INFINITY, f32::max))
+    (
+        low.to_array().into_iter().fold(f32::INFINITY, f32::min),
+        high.to_array().into_iter().fold(f32::NEG_INFINITY, f32::max),
+    )
 }
 
 /// How many values do not exceed one.
 #[inline(always)]
 fn up_to(values: &[f32], most: f32) -> u32 {
-    values.iter().map(|&v| u32::from(v <= most)).sum()
+    values.as_chunks::<COUNTED>().0.as_flattened().iter().map(|&v| u32::from(v <= most)).sum()
 }
 
 #[cfg(test)]

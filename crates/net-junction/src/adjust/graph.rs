@@ -94,6 +94,19 @@ impl Graph {
         (node != NONE).then_some(node as usize)
     }
 
+    /// The nodes with the indices `(i, j)` and those after it along the second direction, so many in all, each with its distance from the first; those out of reach are left out.
+    pub fn nodes_from(&self, (i, j): (i32, i32), count: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let slot = |j: i32| self.slot((i, j));
+        let last = j.saturating_add(count as i32 - 1);
+        let (whole, each) = match slot(j).zip(slot(last)) {
+            Some((first, last)) => (&self.grid[first..=last], 0),
+            // Near the reach's end one after the other.
+            None => (Default::default(), count),
+        };
+        let whole = whole.iter().enumerate().filter(|(_, n)| **n != NONE).map(|(k, n)| (k, *n as usize));
+        whole.chain((0..each).filter_map(move |k| Some((k, self.node_at((i, j.checked_add(k as i32)?))?))))
+    }
+
     /// The edge that leaves a node along a direction.
     pub fn edge_from(&self, node: usize, family: usize) -> Option<usize> {
         let edge = self.outgoing[node][family];

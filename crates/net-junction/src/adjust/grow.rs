@@ -4,6 +4,7 @@ use net_geometry::nalgebra::Vector2;
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, median, upper};
+use crate::adjust::lanes::LANES;
 use crate::adjust::locate::{kernel_for, reach_px, sign, vertex};
 use crate::adjust::map::LatticeMap;
 use crate::adjust::source::Source;
@@ -54,7 +55,6 @@ pub(crate) struct Grower {
     /// Places of `responses`, for edges that are on the list.
     row_of_edge: Vec<u32>,
     profile: Vec<f32>,
-    sums: Vec<i32>,
     /// Rows of twines that are summed up, and their sums by block.
     limited: Vec<f32>,
     block_sums: Vec<f32>,
@@ -195,9 +195,9 @@ impl Grower {
         let normal = Vector2::new(-chord.y, chord.x) / chord.norm();
         let half = steps + kernel.half();
         self.profile.clear();
-        self.profile.resize(2 * half + 1, 0.0);
+        self.profile.resize(2 * half + 1 + LANES, 0.0);
         let mut inside = [true];
-        source.profiles(ends, [0.0; 2], look.coarse_px, &mut inside, &mut self.sums, &mut self.profile);
+        source.profiles(ends, [0.0; 2], look.coarse_px, &mut inside, &mut self.profile);
         let places = 2 * steps + 1;
         let out = &mut self.responses[k * places..][..places];
         self.kernels.amplitudes(&kernel, &self.profile, half - steps, out);
@@ -227,11 +227,18 @@ impl Grower {
         }
         let row = |e: usize| limited.get(row_of_edge[e] as usize * width..)?.get(..width);
         graph.blocks.sum_members(width, row, block_sums);
+        graph.blocks.sum_neighbours(width, block_sums, sum);
         signs.clear();
         strengths.clear();
         for block in 0..graph.blocks.count() {
-            graph.blocks.sum_around(block, width, block_sums, sum);
+            let sum = &block_sums[block * width..][..width];
             let (amplitudes, count) = (&sum[..places], sum[places]);
+            if count == 0.0 {
+                // None was sampled there.
+                signs.push(1.0);
+                strengths.push(0.0);
+                continue;
+            }
             signs.push(sign(amplitudes, sum[places + 1] / (count.max(1.0) * look.coarse_px as f32)));
             strengths.push(most(amplitudes) / count.max(ORIGIN_FEWEST));
         }

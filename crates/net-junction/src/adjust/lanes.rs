@@ -1,5 +1,7 @@
 //! Sums over short rows, eight values at once. To be inlined into what is compiled for wide instructions.
 
+use wide::f32x8;
+
 /// Values that are added at once.
 pub(crate) const LANES: usize = 8;
 
@@ -8,13 +10,11 @@ pub(crate) const LANES: usize = 8;
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let length = a.len().min(b.len());
     let (a, b) = (a[..length].as_chunks::<LANES>(), b[..length].as_chunks::<LANES>());
-    let mut sums = [0.0; LANES];
+    let mut sums = f32x8::ZERO;
     for (a, b) in a.0.iter().zip(b.0) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
+        sums += f32x8::from(*a) * f32x8::from(*b);
     }
-    a.1.iter().zip(b.1).fold(total(sums), |sum, (a, b)| sum + a * b)
+    a.1.iter().zip(b.1).fold(total(sums.to_array()), |sum, (a, b)| sum + a * b)
 }
 
 /// Sum of all lanes.
@@ -66,17 +66,16 @@ impl Detrend {
     pub fn rest(&self, row: &[f32]) -> f32 {
         // About the middle value, so that squares of large grey levels do not cancel.
         let base = row[self.half];
-        let (mut sum, mut squares, mut slope) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut sum, mut squares, mut slope) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
         let parts = self.ones.as_chunks::<LANES>().0.iter().zip(self.ramp.as_chunks::<LANES>().0);
         for (values, (ones, ramp)) in row.as_chunks::<LANES>().0.iter().zip(parts) {
-            for k in 0..LANES {
-                let value = (values[k] - base) * ones[k];
-                sum[k] += value;
-                squares[k] += value * value;
-                slope[k] += (values[k] - base) * ramp[k];
-            }
+            let off = f32x8::from(*values) - f32x8::splat(base);
+            let value = off * f32x8::from(*ones);
+            sum += value;
+            squares += value * value;
+            slope += off * f32x8::from(*ramp);
         }
-        let [sum, squares, slope] = [sum, squares, slope].map(total);
+        let [sum, squares, slope] = [sum, squares, slope].map(|lanes| total(lanes.to_array()));
         (squares - sum * sum / (2 * self.half + 1) as f32 - slope * slope / self.second).max(0.0)
     }
 }

@@ -1,9 +1,11 @@
 //! Where each twine lies, bin by bin: matched filter, local polarity, local amplitude.
 
 use net_image::widely;
+use wide::f32x8;
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Edge, Graph, bend, median, upper};
+use crate::adjust::lanes::LANES;
 use crate::adjust::profile::{COARSE_PX, Profiles};
 use crate::adjust::solve::{Solver, WEIGHT_MAX};
 use crate::adjust::source::Source;
@@ -28,6 +30,9 @@ const BLUR_LEFT: f32 = 0.7;
 /// Twines on which the diameter is tried.
 const FIT_TWINES: usize = 150;
 
+/// Places within a vector.
+const EACH: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
 /// Measured offsets of all bins; keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Locator {
@@ -48,8 +53,6 @@ pub(crate) struct Locator {
     signs: Vec<f32>,
     /// By edge and bin: amplitude where twine is picked; NaN where it is not.
     picked: Vec<f32>,
-    /// At every offset: the bin's amplitude, the less the farther it is from where it is believed to be.
-    near: Vec<f32>,
     /// By edge: twine's typical amplitude; by block: around it.
     amplitudes: Vec<f32>,
     typical: Vec<f32>,
@@ -179,11 +182,10 @@ impl Locator {
         self.profiles.sample(source, graph, (self.steps + self.widest(), step_px), false, 1, None);
         let places = 2 * self.steps + 1;
         let first = self.profiles.half - self.steps;
-        self.responses.resize(graph.edges.len() * self.profiles.bins * places, 0.0);
-        for (k, out) in self.responses.chunks_exact_mut(places).enumerate() {
-            let (edge, bin) = (k / self.profiles.bins, k % self.profiles.bins);
-            self.kernels.amplitudes(&self.kernel_of_edge[edge], self.profiles.row(edge, bin), first, out);
-        }
+        self.responses.resize(graph.edges.len() * self.profiles.bins * places + LANES, 0.0);
+        self.lines.clear();
+        self.lines.resize(graph.edges.len() * places, 0.0);
+        filter_all(self, first, places);
         self.settle_signs(graph);
     }
 
@@ -195,15 +197,7 @@ impl Locator {
 
     /// Whether twine is light or dark, by the strongest line in reach in the neighbourhood.
     fn settle_signs(&mut self, graph: &Graph) {
-        let (bins, places) = (self.profiles.bins, 2 * self.steps + 1);
-        self.lines.clear();
-        self.lines.resize(graph.edges.len() * places, 0.0);
-        let share = 1.0 / bins as f32;
-        for (line, edge) in self.lines.chunks_exact_mut(places).zip(self.responses.chunks_exact(bins * places)) {
-            for row in edge.chunks_exact(places) {
-                line.iter_mut().zip(row).for_each(|(l, a)| *l += share * a);
-            }
-        }
+        let places = 2 * self.steps + 1;
         // One rope or fish must not outvote eighty twines.
         self.scratch.clear();
         let strongest = |line: &[f32]| line.iter().fold(0.0_f32, |most, a| most.max(a.abs()));
@@ -212,6 +206,7 @@ impl Locator {
         self.lines.iter_mut().for_each(|a| *a = a.clamp(-limit, limit));
         let line = |e: usize| Some(&self.lines[e * places..][..places]);
         graph.blocks.sum_members(places, line, &mut self.block_lines);
+        graph.blocks.sum_neighbours(places, &mut self.block_lines, &mut self.sum);
         self.signs.clear();
         for block in 0..graph.blocks.count() {
             let Some(&first) = graph.blocks.members(block).first() else {
@@ -219,8 +214,8 @@ impl Locator {
                 continue;
             };
             let reach = self.reaches[first as usize];
-            graph.blocks.sum_around(block, places, &self.block_lines, &mut self.sum);
-            self.signs.push(sign(&self.sum, reach / self.profiles.step_px as f32));
+            let around = &self.block_lines[block * places..][..places];
+            self.signs.push(sign(around, reach / self.profiles.step_px as f32));
         }
     }
 
@@ -233,8 +228,6 @@ impl Locator {
         self.offsets.reserve(bins);
         self.weights.clear();
         self.weights.reserve(bins);
-        self.near.clear();
-        self.near.resize(2 * self.steps + 1, 0.0);
         pick_all(self, graph, solver);
         self.weigh(graph);
     }
@@ -254,19 +247,23 @@ impl Locator {
                 shape.map_or(0.0, |s| s[0] * (1.0 - along) + s[1] * along + s[2] * bow + s[3] * s_bend - bent);
             let row = &self.responses[(e * bins + bin) * places..][..places];
             let middle = believed / step + self.steps as f32;
-            let last = (places - 1) as f32;
-            let low = (middle - reach / step).ceil().clamp(0.0, last);
-            let high = (middle + reach / step).floor().clamp(0.0, last);
-            for (k, (near, amplitude)) in self.near.iter_mut().zip(row).enumerate() {
-                let q = (k as f32 - middle) * step;
+            let (low, high) = (middle - reach / step, (middle + reach / step).min((places - 1) as f32));
+            // Whole vectors: beyond the row's end is another one's beginning.
+            let padded = &self.responses[(e * bins + bin) * places..][..places.next_multiple_of(LANES)];
+            let (mut best, mut best_at) = (f32x8::ZERO, f32x8::ZERO);
+            for (amplitudes, first) in padded.as_chunks::<LANES>().0.iter().zip((0u8..).step_by(LANES)) {
+                let at = f32x8::from(EACH) + f32x8::splat(f32::from(first));
+                let q = (at - f32x8::splat(middle)) * f32x8::splat(step);
                 // A bell without an exponential.
-                let bell = 1.0 / (1.0 + 0.25 * q * q * inverse);
-                *near = amplitude * sign * bell * bell;
+                let bell = f32x8::ONE / (f32x8::ONE + q * q * f32x8::splat(0.25 * inverse));
+                let near = f32x8::from(*amplitudes) * f32x8::splat(sign) * bell * bell;
+                let better = at.simd_ge(f32x8::splat(low)) & at.simd_le(f32x8::splat(high)) & near.simd_gt(best);
+                (best, best_at) = (better.select(near, best), better.select(at, best_at));
             }
-            let (mut at, mut most) = (0, 0.0_f32);
-            for (k, &near) in self.near.iter().enumerate().take(high as usize + 1).skip(low as usize) {
-                (at, most) = if near > most { (k, near) } else { (at, most) };
-            }
+            let most = best.to_array().into_iter().fold(0.0, |a, b| if b > a { b } else { a });
+            let of_most = best.simd_ge(f32x8::splat(most)).select(best_at, f32x8::splat(f32::MAX));
+            let first = of_most.to_array().into_iter().fold(f32::MAX, |a, b| if b < a { b } else { a });
+            let at = if most > 0.0 { first as usize } else { 0 };
             let k = at.clamp(1, places - 2);
             let part = vertex([k - 1, k, k + 1].map(|k| row[k] * sign));
             let q = (k as f32 - self.steps as f32 + part) * step;
@@ -305,6 +302,21 @@ impl Locator {
             // False for NaN.
             let alike = part > AMPLITUDE_PARTS.0 && part < AMPLITUDE_PARTS.1;
             *weight = if alike { (amplitude / weight.max(least)).powi(2).min(WEIGHT_MAX) } else { 0.0 };
+        }
+    }
+}
+
+widely! {
+    /// Amplitudes of all bins at all places, the first at this value of their profiles, and their means over the twine.
+    fn filter_all<'a>(locator: &'a mut Locator, first: usize, places: usize) -> () {
+        let Locator { profiles, kernels, kernel_of_edge, responses, lines, .. } = locator;
+        let (bins, share) = (profiles.bins, 1.0 / profiles.bins as f32);
+        let of_edges = responses.chunks_exact_mut(bins * places).zip(lines.chunks_exact_mut(places));
+        for (e, (kernel, (responses, line))) in kernel_of_edge.iter().zip(of_edges).enumerate() {
+            for (bin, row) in responses.chunks_exact_mut(places).enumerate() {
+                kernels.amplitudes_inline(kernel, profiles.row(e, bin), first, row);
+                line.iter_mut().zip(row).for_each(|(l, a)| *l += share * *a);
+            }
         }
     }
 }

@@ -44,7 +44,6 @@ pub(crate) struct Profiles {
     /// Middle of each bin, 0 to 1 along the twine.
     pub along: Vec<f32>,
     lengths: Vec<f32>,
-    sums: Vec<i32>,
 }
 
 impl Profiles {
@@ -106,8 +105,8 @@ impl Profiles {
             b += second.half_steps[1 - edge.family];
         }
         let inside = &mut self.inside[e * self.bins..][..self.bins];
-        let values = &mut self.values[e * self.bins * width..][..self.bins * width];
-        source.profiles([a, b], edge.bow, self.step_px, inside, &mut self.sums, values);
+        let values = &mut self.values[e * self.bins * width..][..self.bins * width + LANES];
+        source.profiles([a, b], edge.bow, self.step_px, inside, values);
     }
 }
 

@@ -40,10 +40,8 @@ const MOMENTS: usize = 16;
 /// Normal equations of one twine, bends eliminated: for the displacements of its ends along `normal`.
 #[derive(Debug, Clone, Copy, Default)]
 struct Twine {
-    normal: V2,
-    system: M2,
-    /// Weight of the difference between its ends' total displacements.
-    coherence: f32,
+    /// How the displacement of one end pulls at the other: the block of the normal matrix.
+    across: M2,
     /// Bends are `bend_right - bend_by_end * (s_a, s_b)`.
     bend_right: V2,
     bend_by_end: M2,
@@ -76,6 +74,8 @@ pub(crate) struct Solver {
     /// Displacements since the last [`Solver::commit`].
     step: Vec<V2>,
     right: Vec<V2>,
+    /// By node: its block of the normal matrix, and that inverted.
+    own: Vec<M2>,
     inverse: Vec<M2>,
     residual: Vec<V2>,
     scaled: Vec<V2>,
@@ -152,6 +152,15 @@ impl Solver {
         run(self, graph, (offsets, weights), rounds);
     }
 
+    /// How far, cells, all but one in fifty nodes are at the most from where they were at the start.
+    pub fn moved(&mut self, graph: &Graph) -> f32 {
+        let moves = self.step.iter().zip(&graph.nodes).map(|(step, node)| step.norm() / node.height as f32);
+        self.magnitudes.clear();
+        self.magnitudes.extend(moves);
+        let at = self.magnitudes.len() * 49 / 50;
+        if at == self.magnitudes.len() { 0.0 } else { *self.magnitudes.select_nth_unstable_by(at, f32::total_cmp).1 }
+    }
+
     /// Moves nodes and bends twines as was found.
     pub fn commit(&mut self, graph: &mut Graph) {
         for e in 0..self.twines.len() {
@@ -192,12 +201,14 @@ impl Solver {
         let floor = (1.5 * self.scale).max(RESIDUAL_MIN_PX);
         let unit = 1.0 / (WEIGHT_MAX * floor * floor);
         let bins = self.moments.len();
-        for (e, (edge, frame)) in graph.edges.iter().zip(&self.frames).enumerate() {
+        let measured = self.weights.chunks_exact(bins).zip(offsets.chunks_exact(bins));
+        for ((edge, frame), (weights, offsets)) in graph.edges.iter().zip(&self.frames).zip(measured) {
             let mut m = [0.0_f32; MOMENTS];
             let mut r = [0.0_f32; 4];
-            for (bin, (moments, coefficients)) in self.moments.iter().zip(&self.coefficients).enumerate() {
-                let weight = self.weights[e * bins + bin] * unit;
-                let pull = weight * offsets[e * bins + bin];
+            let bins = self.moments.iter().zip(&self.coefficients).zip(weights.iter().zip(offsets));
+            for ((moments, coefficients), (weight, offset)) in bins {
+                let weight = weight * unit;
+                let pull = weight * offset;
                 m.iter_mut().zip(moments).for_each(|(m, p)| *m += weight * p);
                 r.iter_mut().zip(coefficients).for_each(|(r, c)| *r += pull * c);
             }
@@ -212,8 +223,9 @@ impl Solver {
             let system = ends - cross.tr_mul(&bend_by_end);
             let right = V2::new(r[0], r[1]) - cross.tr_mul(&bend_right);
             let Frame { normal, coherence, different, .. } = *frame;
-            self.twines.push(Twine { normal, system, coherence, bend_right, bend_by_end });
             let outer = normal * normal.transpose();
+            let across = outer * system[(0, 1)] - M2::identity() * coherence;
+            self.twines.push(Twine { across, bend_right, bend_by_end });
             for (k, node) in edge.nodes.into_iter().enumerate() {
                 let (node, sign) = (node as usize, if k == 0 { 1.0 } else { -1.0 });
                 self.right[node] += normal * right[k] + different * (sign * coherence);
@@ -222,6 +234,7 @@ impl Solver {
                 self.inverse[node] += known + M2::identity() * coherence;
             }
         }
+        self.own.clone_from(&self.inverse);
         for block in &mut self.inverse {
             *block = block.try_inverse().unwrap_or_else(M2::zeros);
         }
@@ -230,23 +243,21 @@ impl Solver {
     /// `product = A direction`.
     #[inline(always)]
     fn multiply(&mut self, graph: &Graph) {
-        for ((p, d), prior) in self.product.iter_mut().zip(&self.direction).zip(&self.prior) {
-            *p = d * *prior;
+        for ((p, d), own) in self.product.iter_mut().zip(&self.direction).zip(&self.own) {
+            *p = own * d;
         }
         for (edge, twine) in graph.edges.iter().zip(&self.twines) {
             let [a, b] = edge.nodes.map(|n| n as usize);
-            let (da, db) = (self.direction[a], self.direction[b]);
-            let pull = twine.system * V2::new(twine.normal.dot(&da), twine.normal.dot(&db));
-            let apart = (da - db) * twine.coherence;
-            self.product[a] += twine.normal * pull.x + apart;
-            self.product[b] += twine.normal * pull.y - apart;
+            // Symmetric.
+            let (to_a, to_b) = (twine.across * self.direction[b], twine.across * self.direction[a]);
+            self.product[a] += to_a;
+            self.product[b] += to_b;
         }
     }
 
     #[inline(always)]
     fn conjugate_gradients(&mut self, graph: &Graph, most: usize) {
         let nodes = graph.nodes.len();
-        let dot = |a: &[V2], b: &[V2]| a.iter().zip(b).map(|(x, y)| x.dot(y)).sum::<f32>();
         let precondition = |inverse: &[M2], from: &[V2], to: &mut Vec<V2>| {
             to.clear();
             to.extend(inverse.iter().zip(from).map(|(m, r)| m * r));
@@ -304,6 +315,21 @@ impl Solver {
             *w = w0 / (1.0 + (*w * softness).powi(2)).powi(2);
         }
     }
+}
+
+/// Sum of products, in lanes.
+#[inline(always)]
+fn dot(a: &[V2], b: &[V2]) -> f32 {
+    const NODES: usize = 8;
+    let (a, b) = (a.as_chunks::<NODES>(), b.as_chunks::<NODES>());
+    let mut sums = [V2::zeros(); NODES];
+    for (a, b) in a.0.iter().zip(b.0) {
+        for k in 0..NODES {
+            sums[k] += a[k].component_mul(&b[k]);
+        }
+    }
+    let rest = a.1.iter().zip(b.1).map(|(a, b)| a.component_mul(b));
+    sums.into_iter().chain(rest).sum::<V2>().sum()
 }
 
 impl Twine {

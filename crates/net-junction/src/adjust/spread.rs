@@ -8,7 +8,7 @@ mod cross;
 
 use std::collections::VecDeque;
 
-use net_geometry::nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
+use net_geometry::nalgebra::{Matrix3, Matrix3x2, Vector2};
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, Node};
@@ -65,7 +65,6 @@ pub(crate) struct Spreader {
     found: Vec<(u32, Vector2<f64>)>,
     continued: Continued,
     profile: Vec<f32>,
-    sums: Vec<i32>,
     responses: Vec<f32>,
     values: Vec<f32>,
 }
@@ -271,19 +270,25 @@ impl Spreader {
             let row = |r: usize| Vector2::new(fit[(r, 0)], fit[(r, 1)]);
             return Some((row(0) - graph.nodes[k].predicted, [row(1), row(2)], count));
         }
-        let (mut normal, mut right, mut count) = (Matrix3::zeros(), Matrix3x2::zeros(), 0);
-        for b in -REACH..=REACH {
-            for a in -REACH..=REACH {
-                let Some(n) = graph.node_at((i + a, j + b)).filter(|&n| n != k && self.knots[n].known) else {
+        let (mut moments, mut right, mut count) = ([0.0; 6], [Vector2::zeros(); 3], 0);
+        for a in -REACH..=REACH {
+            for (b, n) in graph.nodes_from((i.saturating_add(a), j.saturating_sub(REACH)), 2 * REACH as usize + 1) {
+                let b = b as i32 - REACH;
+                if (a, b) == (0, 0) || !self.knots[n].known {
                     continue;
-                };
-                let terms = Vector3::new(1.0, f64::from(a), f64::from(b));
+                }
                 let weight = 1.0 / f64::from(a * a + b * b);
-                normal += terms * terms.transpose() * weight;
-                right += terms * self.knots[n].shift.transpose() * weight;
+                let (along, across) = (f64::from(a), f64::from(b));
+                let (by_a, by_b) = (weight * along, weight * across);
+                let terms = [weight, by_a, by_b, by_a * along, by_a * across, by_b * across];
+                moments.iter_mut().zip(terms).for_each(|(m, t)| *m += t);
+                right.iter_mut().zip(terms).for_each(|(r, t)| *r += self.knots[n].shift * t);
                 count += 1;
             }
         }
+        let [w, a, b, aa, ab, bb] = moments;
+        let mut normal = Matrix3::new(w, a, b, a, aa, ab, b, ab, bb);
+        let right = Matrix3x2::from_rows(&right.map(|r| r.transpose()));
         if count < FEWEST {
             return None;
         }

@@ -34,6 +34,8 @@ impl Look {
 pub(crate) struct Kernel {
     /// Class of width, motion blur in quarters of a pixel, and steps on each side of its middle.
     class: (i32, i32, usize),
+    /// Widths of its class, px.
+    widths: (f64, f64),
     start: usize,
     /// Sum of squares.
     energy: f32,
@@ -95,10 +97,14 @@ impl Kernels {
 
     /// The kernel for twine `width` px wide, blurred over `blur` px by motion and by a point spread of `sigma` px, on `half` steps to each side.
     pub fn get(&mut self, width: f64, sigma: f64, blur: f64, half: usize) -> Kernel {
-        let class = ((width.max(1e-3).ln() / CLASS).round() as i32, (4.0 * blur).round() as i32, half.max(2));
-        if let Some(kernel) = self.kernels.iter().find(|k| k.class == class) {
+        let (width, blurred, half) = (width.max(1e-3), (4.0 * blur).round() as i32, half.max(2));
+        let same = |k: &&Kernel| k.widths.0 <= width && width < k.widths.1 && (k.class.1, k.class.2) == (blurred, half);
+        if let Some(kernel) = self.kernels.iter().find(same) {
             return *kernel;
         }
+        let class = ((width.ln() / CLASS).round() as i32, blurred, half);
+        let end = |class: f64| (class * CLASS).exp();
+        let widths = (end(f64::from(class.0) - 0.5), end(f64::from(class.0) + 0.5));
         let (width, blur, half) = ((f64::from(class.0) * CLASS).exp(), 0.25 * f64::from(class.1), class.2 as i32);
         let sigma = sigma.hypot(spread_of_means(self.step_px));
         let edge = |x: f64| normal_cdf(x / sigma);
@@ -122,7 +128,7 @@ impl Kernels {
             let made = self.detrends.len();
             self.detrends.extend((made..=class.2).map(Detrend::new));
         }
-        let kernel = Kernel { class, start, energy };
+        let kernel = Kernel { class, widths, start, energy };
         self.kernels.push(kernel);
         kernel
     }
@@ -135,6 +141,12 @@ impl Kernels {
     pub fn amplitudes(&self, kernel: &Kernel, profile: &[f32], first: usize, out: &mut [f32]) {
         let profile = &profile[first - kernel.half()..][..out.len() + 2 * kernel.half()];
         self.arch.dispatch(Filter { taps: self.taps(kernel), profile, out });
+    }
+
+    /// [`Self::amplitudes`] for callers that are compiled for wide instructions themselves.
+    #[inline(always)]
+    pub fn amplitudes_inline(&self, kernel: &Kernel, profile: &[f32], first: usize, out: &mut [f32]) {
+        filter(self.taps(kernel), &profile[first - kernel.half()..][..out.len() + 2 * kernel.half()], out);
     }
 
     /// Matches the kernel with its middle at value `at` of the profile, which must hold it whole.
@@ -164,21 +176,26 @@ impl WithSimd for Filter<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { taps, profile, out } = self;
-        if let Some(last) = out.len().checked_sub(LANES) {
-            // The last values of a profile that is not a whole number of vectors long are those of an earlier vector, too.
-            for start in (0..last).step_by(LANES).chain([last]) {
-                let mut sums = [0.0_f32; LANES];
-                for (tap, part) in taps.iter().zip(profile[start..].windows(LANES)) {
-                    for (sum, p) in sums.iter_mut().zip(part) {
-                        *sum += tap * p;
-                    }
+        filter(taps, profile, out);
+    }
+}
+
+#[inline(always)]
+fn filter(taps: &[f32], profile: &[f32], out: &mut [f32]) {
+    if let Some(last) = out.len().checked_sub(LANES) {
+        // The last values of a profile that is not a whole number of vectors long are those of an earlier vector, too.
+        for start in (0..last).step_by(LANES).chain([last]) {
+            let mut sums = [0.0_f32; LANES];
+            for (tap, part) in taps.iter().zip(profile[start..].windows(LANES)) {
+                for (sum, p) in sums.iter_mut().zip(part) {
+                    *sum += tap * p;
                 }
-                out[start..start + LANES].copy_from_slice(&sums);
             }
-        } else {
-            for (o, part) in out.iter_mut().zip(profile.windows(taps.len())) {
-                *o = taps.iter().zip(part).map(|(t, p)| t * p).sum();
-            }
+            out[start..start + LANES].copy_from_slice(&sums);
+        }
+    } else {
+        for (o, part) in out.iter_mut().zip(profile.windows(taps.len())) {
+            *o = taps.iter().zip(part).map(|(t, p)| t * p).sum();
         }
     }
 }

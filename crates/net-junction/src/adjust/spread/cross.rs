@@ -4,6 +4,7 @@ use net_geometry::nalgebra::Vector2;
 
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, median};
+use crate::adjust::lanes::LANES;
 use crate::adjust::locate::{reach_px, vertex};
 use crate::adjust::source::Source;
 use crate::adjust::spread::{FEWEST, REACH, Spreader};
@@ -124,16 +125,9 @@ impl Spreader {
         let kernel = self.kernels.get(width, look.spread_px, blur, half);
         let steps = (reach / look.coarse_px).ceil() as usize + 1;
         self.profile.clear();
-        self.profile.resize(2 * (steps + kernel.half()) + 1, 0.0);
+        self.profile.resize(2 * (steps + kernel.half()) + 1 + LANES, 0.0);
         let mut inside = [true];
-        source.profiles(
-            [middle - arm, middle + arm],
-            [0.0; 2],
-            look.coarse_px,
-            &mut inside,
-            &mut self.sums,
-            &mut self.profile,
-        );
+        source.profiles([middle - arm, middle + arm], [0.0; 2], look.coarse_px, &mut inside, &mut self.profile);
         if !inside[0] || !normal.x.is_finite() {
             return None;
         }
