@@ -119,7 +119,8 @@ pub struct Estimate<'a> {
     /// Number of the count of cells. Frames of the same number have the same node as the net frame's origin. Each time the net was lost and the count had to start
     /// anew it is one that was not there before; when a place is recognised, or a doubt is settled, it is again that of the earlier count.
     pub track: u32,
-    /// How that count goes on from the frames before; of frames with a pose.
+    /// How that count goes on from the frames before. What happened to it in frames without a pose, whose cells are counted all the same where their lattice is known, is said with the next pose;
+    /// a doubt, and how it is settled, in every frame.
     pub connection: Connection,
     /// Cells that were added to the names of this frame's nodes, which had been carried on from the frame before. Zero where a place was recognised or a count begun.
     pub corrected: (i32, i32),

@@ -16,6 +16,8 @@ pub struct Tracker {
     method: Engine,
     threshold: f64,
     previous_ns: Option<i64>,
+    /// Whether the last frame had a pose.
+    posed: bool,
     junctions: Vec<Junction>,
     /// Whether to look for more than one net, and what was found.
     several: bool,
@@ -50,6 +52,7 @@ impl Tracker {
             method,
             threshold,
             previous_ns: None,
+            posed: false,
             junctions: Vec::new(),
             several: config.layers,
             layers: Vec::new(),
@@ -98,7 +101,8 @@ impl Tracker {
         let connection = found.map_or(Connection::Followed, |f| f.connection);
         let (corrected, in_doubt) = found.map_or(((0, 0), 0), |f| (f.corrected, f.in_doubt));
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
-        let status = if net.is_some() { Status::Ok } else { Status::NoNet };
+        self.posed = net.is_some();
+        let status = if self.posed { Status::Ok } else { Status::NoNet };
         self.layers.clear();
         if let (Some(net), true) = (net, self.several) {
             self.layers.push(Layer { net, probability, followed: true });
@@ -110,35 +114,35 @@ impl Tracker {
             self.layers.sort_by(|a, b| a.net.range_m.total_cmp(&b.net.range_m));
         }
         let twines = match &self.method {
-            Engine::Lattice(method) if net.is_some() => method.twines(),
+            Engine::Lattice(method) if self.posed => method.twines(),
             _ => &[],
         };
         let (junctions, layers) = (&self.junctions, &self.layers);
         Ok(Estimate { status, probability, net, track, connection, corrected, in_doubt, junctions, twines, layers })
     }
 
-    /// Where a point of the lattice (fractions included) is in the last frame that had a pose: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as
-    /// it hangs, bent or sheared. `None` for what is not in front of the camera, before the first pose, and for methods without a sheet.
+    /// Where a point of the lattice (fractions included) is in the last frame: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as
+    /// it hangs, bent or sheared. `None` for what is not in front of the camera, if that frame had no pose, and for methods without a sheet.
     pub fn pixel_from_lattice(&self, at: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         match &self.method {
-            Engine::Lattice(method) => method.pixel_from_lattice(at),
-            Engine::Thesis(_) => None,
+            Engine::Lattice(method) if self.posed => method.pixel_from_lattice(at),
+            _ => None,
         }
     }
 
     /// The same pixel by the knots that were measured, bilinear between them, and a little beyond. Where the sheet misfits, this is where the net is. `None` where no knot is near.
     pub fn pixel_by_knots(&self, at: Vector2<f64>) -> Option<Vector2<f64>> {
         match &self.method {
-            Engine::Lattice(method) => method.pixel_by_knots(at),
-            Engine::Thesis(_) => None,
+            Engine::Lattice(method) if self.posed => method.pixel_by_knots(at),
+            _ => None,
         }
     }
 
-    /// Lattice coordinates of what the optical axis meets in the last frame that had a pose; `None` as above.
+    /// Lattice coordinates of what the optical axis meets in the last frame; `None` as above.
     pub fn lattice_at_axis(&self) -> Option<Vector2<f64>> {
         match &self.method {
-            Engine::Lattice(method) => method.lattice_at_axis(),
-            Engine::Thesis(_) => None,
+            Engine::Lattice(method) if self.posed => method.lattice_at_axis(),
+            _ => None,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Sequences in which the count of cells slipped in silence, each before something was changed that keeps its kind from it.
+//! Sequences in which the count of cells slipped in silence, or was begun anew for no need, each before something was changed that keeps its kind from it.
 
 #[path = "../examples/counting/sequence.rs"]
 #[allow(dead_code)]
@@ -29,6 +29,16 @@ fn names_that_are_right_are_not_renamed() {
 fn what_a_velocity_is_off_by_over_a_gap_is_not_taken_for_that_of_a_frame() {
     // Off by a cell a frame, and by two over the frame without a pose; settled as if by one there too.
     counts("behind", 7517);
+}
+
+#[test]
+fn cells_are_counted_through_frames_without_a_pose() {
+    // The normal is too doubtful for a pose in every sixth frame, the lattice is not. With the count begun anew after each, twelve frames were flagged.
+    let kind = KINDS.iter().position(|kind| *kind == "far").expect("a kind");
+    let mut tally = Tally::default();
+    run(&sequence(kind, FRAMES, 8016), 1, &mut tally).expect("a simulated sequence");
+    assert!(tally.refused >= 3, "without gaps nothing is shown: {tally:?}");
+    assert_eq!((tally.silent, tally.flagged), (0, 0), "{tally:?}");
 }
 
 #[test]

@@ -17,7 +17,8 @@ impl Random {
 }
 
 /// Kinds of sequences.
-pub const KINDS: [&str; 9] = ["strafe", "loop", "approach", "bent", "fish", "murky", "bare", "behind", "rounds"];
+pub const KINDS: [&str; 10] =
+    ["strafe", "loop", "approach", "bent", "fish", "murky", "bare", "behind", "rounds", "far"];
 /// How often `rounds` goes round, and pictures of open water in each round but the first.
 pub const ROUNDS: u32 = 3;
 const WATER_FRAMES: u32 = 12;
@@ -35,7 +36,8 @@ pub fn sequence(kind: usize, frames: u32, seed: u64) -> Scenario {
     (camera.image_width, camera.image_height) = (424, 240);
     (camera.fx, camera.fy, camera.cx, camera.cy) = (300.0, 300.0, 211.5, 119.5);
     let scene = &mut scenario.scene;
-    let range_m = random.between(0.6, 1.2);
+    // Cells of 15 px and more; far ones of 5 to 8, where many a frame has a lattice and no pose.
+    let range_m = if KINDS[kind] == "far" { random.between(2.0, 2.8) } else { random.between(0.6, 1.2) };
     scene.layers[0].pose = NetPose {
         range_m,
         tilt_x_deg: random.between(-12.0, 12.0),
@@ -61,7 +63,7 @@ pub fn sequence(kind: usize, frames: u32, seed: u64) -> Scenario {
         net.growth.density = 0.0;
         net.jitter = random.between(0.01, 0.02);
     }
-    if matches!(KINDS[kind], "bent" | "behind") {
+    if matches!(KINDS[kind], "bent" | "behind" | "far") {
         net.surface = Surface {
             curvature_per_m: [random.between(-0.5, 0.5), random.between(-0.2, 0.2), random.between(-0.4, 0.4)],
             cubic_per_m2: [random.between(-0.2, 0.2), 0.0, random.between(-0.2, 0.2), 0.0],

@@ -23,12 +23,14 @@ pub(crate) struct LatticeMethod {
     motion: Motion,
     count: CellCount,
     flow: FlowTracker,
-    /// The last answer that was vouched for, and when.
+    /// The last answer whose lattice was known, and when. Its cells are counted even where its normal is too doubtful to vouch for a pose.
     last: Option<(i64, LatticeEstimate)>,
     /// Frames since.
     frames_since: u32,
-    /// When the frame was taken that the flow starts from, if its answer was vouched for.
+    /// When the frame was taken that the flow starts from, if its lattice was known.
     flow_from: Option<i64>,
+    /// What became of the count in frames without a pose, to be said with the next pose.
+    unsaid: Option<Connection>,
     /// Whether the velocity spans a count begun anew that nothing has proved since.
     velocity_in_doubt: bool,
     adjuster: NetAdjuster,
@@ -119,6 +121,7 @@ impl LatticeMethod {
             last: None,
             frames_since: 0,
             flow_from: None,
+            unsaid: None,
             velocity_in_doubt: false,
             adjuster: NetAdjuster::new(width, height, &AdjustConfig::default())?,
             twines: Vec::with_capacity(TWINES),
@@ -167,25 +170,44 @@ impl LatticeMethod {
             return Ok(None);
         };
         let vouched = estimate.probability >= self.threshold;
-        let (mut connection, mut corrected, mut in_doubt) = (Connection::Followed, (0, 0), 0);
-        if vouched {
+        let known = estimate.evidence.lattice_probability() >= self.threshold;
+        let (mut connection, mut cells, mut in_doubt) = (Connection::Followed, (0, 0), 0);
+        if known {
             self.list_junctions(image, &estimate, junctions)?;
             let counted = self.count_cells(&estimate, naming, junctions);
             estimate = estimate.renumbered(counted.cells);
-            (connection, in_doubt) = (counted.connection, counted.in_doubt);
-            if matches!(connection, Connection::Followed | Connection::Settled) {
-                corrected = counted.cells;
-            }
+            (connection, cells, in_doubt) = (counted.connection, counted.cells, counted.in_doubt);
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
         }
         let (net, probability, track) = (net_pose(&estimate), estimate.probability, self.count.track());
-        self.flow_from = vouched.then_some(timestamp_ns);
-        if vouched {
+        self.flow_from = known.then_some(timestamp_ns);
+        if known {
             self.last = Some((timestamp_ns, estimate));
             self.frames_since = 0;
         }
+        if vouched {
+            connection = self.say(connection);
+        } else {
+            junctions.clear();
+            self.withhold(connection);
+        }
+        let carried_on = matches!(connection, Connection::Followed | Connection::Settled);
+        let corrected = if carried_on { cells } else { (0, 0) };
         Ok(Some(Found { net, probability, track, connection, corrected, in_doubt }))
+    }
+
+    /// How the count goes on to this pose from the one before, whatever happened in between.
+    fn say(&mut self, connection: Connection) -> Connection {
+        let unsaid = self.unsaid.take();
+        if connection == Connection::Followed { unsaid.unwrap_or(connection) } else { connection }
+    }
+
+    /// Keeps what a frame without a pose says of the count. A doubt, and how it is settled, is said of every frame.
+    fn withhold(&mut self, connection: Connection) {
+        if matches!(connection, Connection::Started | Connection::Recognised | Connection::Restarted) {
+            self.unsaid = Some(connection);
+        }
     }
 
     /// Where the net may be, from the surest witness to the least; the flow, which takes its time, is not asked yet.
@@ -213,7 +235,7 @@ impl LatticeMethod {
         Expected { by_prior: prior.is_some(), first, steady, flowed: None, rest }
     }
 
-    /// Whether the frame before had a pose that was vouched for.
+    /// Whether the lattice was known in the frame before.
     fn gapless(&self) -> bool {
         self.last.as_ref().is_some_and(|(then, _)| self.flow_from == Some(*then))
     }
@@ -265,29 +287,29 @@ impl LatticeMethod {
         counted
     }
 
-    /// The net before or behind the one of the last frame that had a pose, in that frame's picture.
+    /// The net before or behind the one of the last frame whose lattice was known, in that frame's picture.
     pub fn another(&mut self, image: GrayView<'_>) -> Result<Option<Layer>> {
         let Some((_, first)) = &self.last else { return Ok(None) };
         let other = self.estimator.another(image, first)?;
         Ok(other.map(|e| Layer { net: net_pose(&e), probability: e.probability, followed: false }))
     }
 
-    /// The twines of the last frame that had a pose.
+    /// The twines of the last frame whose lattice was known.
     pub fn twines(&self) -> &[Twine] {
         &self.twines
     }
 
-    /// Pixel of a lattice point by the measured knots of the last frame that had a pose.
+    /// Pixel of a lattice point by the measured knots of the last frame whose lattice was known.
     pub fn pixel_by_knots(&self, at: Vector2<f64>) -> Option<Vector2<f64>> {
         self.knots.pixel(at)
     }
 
-    /// Pixel and depth, m, of a lattice point in the last frame that had a pose.
+    /// Pixel and depth, m, of a lattice point in the last frame whose lattice was known.
     pub fn pixel_from_lattice(&self, at: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         self.last.as_ref()?.1.pixel_from_lattice(self.estimator.camera(), at)
     }
 
-    /// Lattice coordinates at the optical axis in the last frame that had a pose.
+    /// Lattice coordinates at the optical axis in the last frame whose lattice was known.
     pub fn lattice_at_axis(&self) -> Option<Vector2<f64>> {
         let camera = self.estimator.camera();
         self.last.as_ref()?.1.lattice_from_pixel(camera, Vector2::new(camera.cx(), camera.cy()))

@@ -192,21 +192,32 @@ impl Evidence {
 
     /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
     ///
+    /// That of its lattice, times the chances that tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were its standard deviation `tilt_sigma`
+    /// (rad) true but for a factor.
+    pub fn probability(&self, tilt_sigma: f64) -> f64 {
+        // A bend that nearly every tile agrees on is the net's, and may be as large as the answer's tolerance; else it may be the fit's alone.
+        let agreed = ((self.comb_good - 0.7) / 0.2).clamp(0.0, 1.0);
+        let straight = logistic((3.5 + 1.5 * agreed - self.bend.to_degrees()) / 0.4);
+        // Rayleigh, both axes alike: where sheets are bent, errors of the worst are twice what the covariance says.
+        let sigma = (2.0 * tilt_sigma).max(1e-6);
+        let normal = 1.0 - (-0.5 * (5f64.to_radians() / sigma).powi(2)).exp();
+        self.lattice_probability() * straight * normal
+    }
+
+    /// Probability that there is a net and that its meshes are where the lattice has them in the picture, however well its normal is known.
+    ///
     /// A logistic rule of the second harmonic's coherence, which counts up to a point, and of the share of tiles that agree by all harmonics; less, of a sheet that
     /// bends, the share of those that do not agree: it can settle a cycle off where tiles are missing. Then the chances that twines are where the lattice has
-    /// them but for noise, that the tiles about the axis bear the bend and strong waves do not contradict it, that the pattern is one of two families of twine,
-    /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker; lines at random are never quite alike), that
-    /// tangent and mean plane are the same thing, and that the normal's error is below 5 degrees, were its standard deviation `tilt_sigma` (rad) true but for a
-    /// factor.
+    /// them but for noise, that the tiles about the axis bear the bend and strong waves do not contradict it, that the pattern is one of two families of twine, and
+    /// that all its cells are alike (bricks repeat in two cells, and one family of their joints is the weaker; lines at random are never quite alike).
     ///
     /// The weights are a logistic regression with weights of one sign on 635 scenes of the simulator's studies (`net_sim::Study`), 270 of them without a net, half of
     /// those patterns much like one, wrong claims counted eightfold, the constant then raised by a half by hand; see the examples `study` and `score` for what they lead to.
-    pub fn probability(&self, tilt_sigma: f64) -> f64 {
+    pub fn lattice_probability(&self) -> f64 {
         // Nothing but the second harmonic was not fitted: without one nothing is vouched for, and one deviation is what noise has. Motion blur turns its sign in
         // one family; in both it is turned where the pattern is no twine (scales).
         let weaker = weaker(self.v2);
         let second = if self.v2[0] < 0.0 && self.v2[1] < 0.0 { 0.0 } else { (weaker - 1.0).clamp(0.0, 5.0) };
-        let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
         let bend_deg = self.bend.to_degrees();
         let whole = self.comb_good.min(0.8);
         let unsettled = (1.0 - self.comb_good.min(1.0)) * bend_deg.min(1.0);
@@ -234,14 +245,12 @@ impl Evidence {
         let differs = 0.02 + 0.03 * strong + (1.5 - 0.3 * strong) / snr;
         let limit = (0.01 + 0.15 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
-        // A bend that nearly every tile agrees on is the net's, and may be as large as the answer's tolerance; else it may be the fit's alone.
-        let agreed = ((self.comb_good - 0.7) / 0.2).clamp(0.0, 1.0);
-        let straight = logistic((3.5 + 1.5 * agreed - bend_deg) / 0.4);
-        // Rayleigh, both axes alike: where sheets are bent, errors of the worst are twice what the covariance says.
-        let sigma = (2.0 * tilt_sigma).max(1e-6);
-        let normal = 1.0 - (-0.5 * (5f64.to_radians() / sigma).powi(2)).exp();
-        there * steady * borne * uncontradicted * twine * alike * straight * normal
+        there * steady * borne * uncontradicted * twine * alike
     }
+}
+
+fn logistic(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ impl HeldBack {
         tracked: Result<&Tracked, &str>,
     ) -> Result<()> {
         match tracked {
-            Ok(t) if t.connection == Connection::Doubted && t.net.is_some() => {
+            Ok(t) if t.connection == Connection::Doubted => {
                 if t.in_doubt == 1 {
                     // Another doubt: the one before was not settled.
                     self.flush(folder)?;
