@@ -3,7 +3,7 @@
 //!     cargo run --release -p net-lattice --example lattice_study -- STUDY [SCENES] [SEED]
 //!     cargo run --release -p net-lattice --example lattice_study -- named [FRAMES] [NAME]
 //!
-//! STUDY: `planar`, `hung`, `negative`, `noise`, `jitter2`, `jitter5`, `sag` (see [`net_sim::Study`]). `named`: the simulator's own
+//! STUDY: `planar`, `hung`, `negative`, `noise`, `jitter2`, `jitter5`, `sag`, `overgrown` (see [`net_sim::Study`]). `named`: the simulator's own
 //! scenarios (those with NAME in their name), at most FRAMES of each.
 //!
 //! A line per scene, then a table. Wrong: range off by more than 5 %, normal or in-plane rotation by more than 5 degrees. The errors per

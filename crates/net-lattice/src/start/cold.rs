@@ -137,10 +137,13 @@ impl Workspace {
         refine::interleave(refined);
     }
 
-    /// Between lattices that are there beyond doubt, two nets or periods of one, the drawing's gain decides. What a fish or a shadow is explained by counts
+    /// Between lattices that are there beyond doubt, two nets or periods of one, the drawing's gain decides; one whose drawing explains less than an empty picture is none of them: where
+    /// tufts as dark as twine is bright cancel its first wave, every part of the period is in better step than the period itself. What a fish or a shadow is explained by counts
     /// for nothing, so in doubt it is how high a candidate stood in the search, how far above its background, and how well the tiles agree.
     fn best_lock(locks: &[Lock]) -> Option<Lock> {
-        if let Some(top) = locks.iter().filter(|l| l.coherence() > SURE).max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+        if let Some(top) =
+            locks.iter().filter(|l| l.coherence() > SURE && l.gain > 0.0).max_by(|a, b| a.gain.total_cmp(&b.gain))
+        {
             return Some(*top);
         }
         let coherence = |l: &Lock| l.coherence() + 0.25 * (l.evidence.v[0].abs() + l.evidence.v[1].abs());

@@ -38,6 +38,8 @@ pub enum Study {
     Jitter5,
     /// As [`Study::Noise`], the sheet bent by up to 0.15 per metre in every direction, sides as long as ever.
     Sag,
+    /// As [`Study::Noise`], knots up to 3 % of a side off their places, and tufts of growth on a tenth to nine tenths of the twine pieces, 8 to 24 mm, dark as a rule.
+    Overgrown,
     /// Two nets one behind the other: as [`Study::Noise`], the front one from 0.4 to 1.5 m and to 40 degrees, the other 1.3 to 2.5 times as
     /// far and turned by up to 25 degrees against it; nowhere in view do they meet.
     Layers,
@@ -49,7 +51,7 @@ pub enum Study {
 
 impl Study {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Planar,
         Self::Hung,
         Self::Negative,
@@ -57,6 +59,7 @@ impl Study {
         Self::Jitter2,
         Self::Jitter5,
         Self::Sag,
+        Self::Overgrown,
         Self::Layers,
         Self::Seam,
     ];
@@ -71,6 +74,7 @@ impl Study {
             Self::Jitter2 => "jitter2",
             Self::Jitter5 => "jitter5",
             Self::Sag => "sag",
+            Self::Overgrown => "overgrown",
             Self::Layers => "layers",
             Self::Seam => "seam",
         }
@@ -89,6 +93,15 @@ impl Study {
                 let bend = 0.15;
                 net.surface.curvature_per_m =
                     [draw.between(-bend, bend), draw.between(-bend, bend), draw.between(-bend, bend)];
+            }),
+            Self::Overgrown => steady(seed, |draw, net| {
+                net.jitter = draw.between(0.0, 0.03);
+                net.growth = Growth {
+                    density: draw.between(0.1, 0.9),
+                    size_m: draw.between(0.008, 0.024),
+                    grey: draw.between(5.0, 100.0),
+                    ..Growth::default()
+                };
             }),
             Self::Layers => layers(seed),
             Self::Seam => seam(seed),

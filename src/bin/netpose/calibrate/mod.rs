@@ -38,7 +38,7 @@ pub struct Args {
     /// Seed of the first scene; the others follow it
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// Only these studies: planar, hung, negative, noise, jitter2, jitter5, sag, layers, seam. Default planar, hung and negative
+    /// Only these studies: planar, hung, negative, noise, jitter2, jitter5, sag, overgrown, layers, seam. Default planar, hung and negative
     #[arg(long = "study", value_name = "STUDY")]
     studies: Vec<Study>,
     /// Parameters, TOML; what it leaves out keeps its default
