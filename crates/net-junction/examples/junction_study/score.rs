@@ -14,6 +14,8 @@ const RIGHT_PX: f64 = 2.0;
 const FALSE_RATE: f64 = 1e-4;
 /// Holes closer to the picture's end than this are not asked for, px.
 const MARGIN_PX: f64 = 4.0;
+/// Cells, px, from which on single twines are counted apart.
+pub const SIZES_PX: [f64; 2] = [8.0, 12.0];
 
 /// Sums over pictures.
 #[derive(Debug, Default)]
@@ -34,6 +36,8 @@ pub struct Score {
     /// Found and true holes of two twines or more, and of one.
     pub large: [usize; 2],
     pub single: [usize; 2],
+    /// The same by size of cells: below the first of [`SIZES_PX`], between them, and above.
+    pub single_by_size: [[usize; 2]; 3],
     pub false_holes: usize,
     /// Twines that are there and are called missing.
     pub false_missing: usize,
@@ -51,6 +55,9 @@ impl Score {
             self.squares[k] += other.squares[k];
             self.large[k] += other.large[k];
             self.single[k] += other.single[k];
+            for (sum, more) in self.single_by_size.iter_mut().zip(other.single_by_size) {
+                sum[k] += more[k];
+            }
         }
         self.cells_px += other.cells_px;
         self.missing.extend(other.missing);
@@ -217,6 +224,12 @@ pub fn score(adjuster: &NetAdjuster, sample: &Sample, truth: &impl LatticeMap, l
             continue;
         }
         let hit = usize::from(!hole.is_disjoint(&found));
+        if let (1, Some(twine)) = (hole.len(), hole.first()) {
+            let cell = cell_px(truth, twine.0).unwrap_or(0.0);
+            let size = &mut score.single_by_size[SIZES_PX.iter().filter(|&&s| cell >= s).count()];
+            size[0] += hit;
+            size[1] += 1;
+        }
         let counts = if hole.len() == 1 { &mut score.single } else { &mut score.large };
         counts[0] += hit;
         counts[1] += 1;

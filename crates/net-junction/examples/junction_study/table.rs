@@ -1,7 +1,7 @@
 //! The results in Markdown.
 
 use crate::Kind;
-use crate::score::Score;
+use crate::score::{SIZES_PX, Score};
 
 pub fn print(kinds: &[Kind]) {
     println!(
@@ -39,9 +39,10 @@ pub fn print(kinds: &[Kind]) {
     }
     println!();
     println!(
-        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 (log likelihood ratio) | holes of 2 or more found | single twines found | false holes (twines) |"
+        "| missing twines | pose | missing | intact | AUC | found at a false rate of 1e-4 (log likelihood ratio) | holes of 2 or more found | single twines found | cells below {} px | to {} px | above | false holes (twines) |",
+        SIZES_PX[0], SIZES_PX[1]
     );
-    println!("|{}", "---|".repeat(9));
+    println!("|{}", "---|".repeat(12));
     for kind in kinds {
         for (pose, score) in [("true", &kind.truly), ("estimated", &kind.estimated)] {
             if !score.missing.is_empty() {
@@ -53,8 +54,9 @@ pub fn print(kinds: &[Kind]) {
 
 fn print_missing(name: &str, pose: &str, score: &Score) {
     let (auc, found, threshold) = score.missing_twines();
+    let [small, middle, large] = score.single_by_size.map(|[found, all]| format!("{found}/{all}"));
     println!(
-        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} ({threshold:.1}) | {}/{} | {}/{} | {} ({}) |",
+        "| {name} | {pose} | {} | {} | {auc:.5} | {found:.3} ({threshold:.1}) | {}/{} | {}/{} | {small} | {middle} | {large} | {} ({}) |",
         score.missing.len(),
         score.intact.len(),
         score.large[0],

@@ -156,10 +156,10 @@ impl Lines {
         of_halves.map(|(half, _)| half.iter().sum::<f32>()).fold(f32::MAX, f32::min) / window as f32
     }
 
-    /// The largest amplitude of a bin between the knots, in parts of the template's.
-    pub fn left(&self, e: usize, profiles: &Profiles) -> f32 {
+    /// The least and the largest amplitude of a bin between the knots, in parts of the template's.
+    pub fn left(&self, e: usize, profiles: &Profiles) -> (f32, f32) {
         let bins = &self.amplitudes[e * profiles.bins..][..profiles.bins];
-        bins[self.middle.clone()].iter().copied().fold(f32::MIN, f32::max)
+        bins[self.middle.clone()].iter().fold((f32::MAX, f32::MIN), |(least, most), &a| (least.min(a), most.max(a)))
     }
 
     /// Mean grey level of the weakest half, on the half of the width next to the line: growth is not much wider than twine.

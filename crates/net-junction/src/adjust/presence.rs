@@ -11,7 +11,7 @@ use crate::adjust::lines::{Lines, Means, SHIFT};
 use crate::adjust::outside::Outside;
 use crate::adjust::profile::{FINE_PX, Profiles};
 use crate::adjust::source::Source;
-use crate::adjust::statistic::{evidence, vote};
+use crate::adjust::statistic::{evidence, evidence_of_gap, vote};
 
 /// Least scatter of relative amplitudes, of twines and of control lines.
 const SCATTER_MIN: (f32, f32) = (0.06, 0.07);
@@ -25,6 +25,9 @@ const FOREIGN: f32 = 2.5;
 /// A gap has nothing of the usual amplitude left, in any bin between the knots, and its place is no more deviations off the meshes beside it. Flakes and tufts are
 /// smaller than meshes, and of other brightness than water.
 const GAP: (f32, f32) = (0.6, 1.2);
+/// Parts of the usual amplitude between which are those of gaps and of what is left of broken twine. A flake that covers a part of twine looks like the opposite of twine, or
+/// like thicker one.
+const LEFT: (f32, f32) = (-0.45, 1.15);
 /// Part of the usual amplitude that a weak half must have somewhere beside the line to be that of a twine which the line has missed. In cells of
 /// 10 px and more that are drawn with broken twines, 99 in a hundred of these have less than a third.
 const ASTRAY: f32 = 0.5;
@@ -64,6 +67,19 @@ pub struct Twine {
     pub contrast: f32,
 }
 
+/// What a twine that looks missing looks like.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Gap {
+    /// How many things speak against one: that something is left, and that its place is unlike the meshes beside it or these are out of view.
+    pub doubts: u32,
+    /// What is left may be that of twine.
+    pub stubs: bool,
+    /// Log likelihood ratio, twine to gap, of what shows it best.
+    pub llr: f32,
+    /// How many standard deviations the neighbourhood's twines differ from gaps.
+    pub contrast: f32,
+}
+
 /// Buffers of this stage, and what it found for each edge.
 #[derive(Debug, Default)]
 pub(crate) struct Presence {
@@ -80,8 +96,8 @@ pub(crate) struct Presence {
     covered: Covered,
     foreign: Foreign,
     outside: Outside,
-    /// By edge: whether it looks missing, and nothing of it is left nor anything else there.
-    gaps: Vec<bool>,
+    /// By edge: what speaks for a gap where it looks missing.
+    gaps: Vec<Gap>,
     /// By edge: log likelihood ratio, net to no net, of the whole twine by normal densities, limited; NaN outside the picture.
     pub votes: Vec<f32>,
     /// The twines, in the graph's order.
@@ -162,16 +178,20 @@ impl Presence {
             let block = graph.blocks.of_edge(e);
             let (weak_llr, contrast) = evidence(&self.twine.weakest, &self.control.weakest, e, block);
             let (whole_llr, whole_contrast) = evidence(&self.twine.whole, &self.control.whole, e, block);
+            // Half of a twine shows a break that leaves stubs, the whole of it one that leaves none.
+            let gap = [(&self.twine.weakest, &self.control.weakest), (&self.twine.whole, &self.control.whole)];
+            let gap = gap.map(|(twine, control)| evidence_of_gap(twine, control, e, block));
+            let gap = gap.into_iter().fold((f32::MAX, f32::MIN), |a, b| (a.0.min(b.0), a.1.max(b.1)));
             let covered = self.covered.beside(graph, edge);
             let known = !self.twine.weakest.values[e].is_nan() && self.appearance.centred[block];
             let told = known && f64::from(contrast) > config.gate;
             let told_whole = known && f64::from(whole_contrast) > config.gate;
-            // Half of a twine shows a break, the whole of it that it is there.
             let llr = if told && f64::from(weak_llr) < config.missing_llr || !told_whole {
                 weak_llr
             } else {
                 weak_llr.max(whole_llr)
             };
+            let llr = if told && f64::from(gap.0) < config.missing_llr { llr.min(gap.0) } else { llr };
             let llr = if known { llr } else { 0.0 };
             let state = match f64::from(llr) {
                 l if (told || told_whole) && l > config.present_llr => TwineState::Present,
@@ -187,16 +207,26 @@ impl Presence {
                 && self.twine.elsewhere(e, self.appearance.template(block), profiles, height)
                     > ASTRAY * self.twine.weakest.typical(block);
             let (state, llr) = if astray { (TwineState::Unknown, 0.0) } else { (state, llr) };
-            self.gaps.push(
-                state == TwineState::Missing
-                    && self.twine.left(e, profiles) < GAP.0 * self.twine.weakest.typical(block)
-                    && self.foreign_at(graph, profiles, e) < GAP.1,
-            );
+            let gone = state == TwineState::Missing;
+            self.gaps.push(if gone { self.look_of_gap(graph, profiles, e, gap) } else { Gap::default() });
             // None for what is outside the picture.
             let contrast = if self.appearance.means.inside[e] { contrast.max(whole_contrast) } else { 0.0 };
             let vote = if known { vote(&self.twine.full, &self.control.full, e, block) } else { 0.0 };
             self.votes.push(if self.appearance.means.inside[e] { vote } else { f32::NAN });
             self.twines.push(Twine { index, direction: edge.family, state, llr, contrast });
+        }
+    }
+
+    /// What a twine that looks missing, by a log likelihood ratio and a contrast, has where it should be.
+    fn look_of_gap(&self, graph: &Graph, profiles: &Profiles, e: usize, (llr, contrast): (f32, f32)) -> Gap {
+        let usual = self.twine.weakest.typical(graph.blocks.of_edge(e));
+        let (least, most) = self.twine.left(e, profiles);
+        let alike = self.foreign_at(graph, profiles, e) < GAP.1;
+        Gap {
+            doubts: u32::from(most >= GAP.0 * usual) + u32::from(!alike),
+            stubs: least > LEFT.0 * usual && most < LEFT.1 * usual,
+            llr,
+            contrast,
         }
     }
 
