@@ -105,6 +105,9 @@ impl Outside {
             }
         }
         self.change(graph, twines, TwineState::Doubtful, |o, r| !o.evidence[r].is_hole(config));
+        for (twine, gap) in twines.iter_mut().zip(gaps).filter(|(t, _)| gone(t)) {
+            twine.llr = twine.llr.min(gap.llr);
+        }
     }
 
     /// Joins the meshes on both sides of the twines that belong.

@@ -191,14 +191,14 @@ impl Presence {
             } else {
                 weak_llr.max(whole_llr)
             };
-            let llr = if told && f64::from(gap.0) < config.missing_llr { llr.min(gap.0) } else { llr };
+            let looks_gone = told && f64::from(gap.0) < config.missing_llr;
             let llr = if known { llr } else { 0.0 };
             let state = match f64::from(llr) {
                 l if (told || told_whole) && l > config.present_llr => TwineState::Present,
                 l if l > 0.0 && told && covered <= HIDDEN => TwineState::Unknown,
                 _ if !told && covered <= HIDDEN => TwineState::Unknown,
                 _ if covered > HIDDEN => TwineState::Hidden,
-                l if l < config.missing_llr => self.look_again(graph, profiles, e),
+                l if l < config.missing_llr || looks_gone => self.look_again(graph, profiles, e),
                 _ => TwineState::Unknown,
             };
             // A twine that lies elsewhere within reach is not gone; where it runs is not known either.
