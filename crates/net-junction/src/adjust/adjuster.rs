@@ -23,8 +23,6 @@ const SIGMA_MIN_PX: f64 = 0.03;
 const SHADING: f64 = 0.12;
 /// Rounds of robust reweighting: on newly sampled profiles, and on the same ones again.
 const ROUNDS: [usize; 2] = [4, 3];
-/// Where all but one in fifty knots lie this near to where they were believed to be, cells, looking for them within less on the same profiles changes nothing.
-const STEADY_CELLS: f32 = 0.1;
 /// How often knots may lead to another prediction, how often to one that goes farther, and how many of them, and which part of all, must be elsewhere than the last one
 /// says, or new.
 const LED: usize = 2;
@@ -166,9 +164,6 @@ impl NetAdjuster {
             locator.look(source, graph, look, widest, look.coarse_px);
             solver.start(graph, &locator.profiles.along, config);
             for (pass, &search) in wider.iter().enumerate() {
-                if pass > 0 && solver.moved(graph) < STEADY_CELLS {
-                    break;
-                }
                 locator.reach(graph, search);
                 locator.pick(graph, (pass > 0).then_some(&*solver));
                 solver.solve(graph, &locator.offsets, &locator.weights, ROUNDS[usize::from(pass > 0)]);

@@ -152,15 +152,6 @@ impl Solver {
         run(self, graph, (offsets, weights), rounds);
     }
 
-    /// How far, cells, all but one in fifty nodes are at the most from where they were at the start.
-    pub fn moved(&mut self, graph: &Graph) -> f32 {
-        let moves = self.step.iter().zip(&graph.nodes).map(|(step, node)| step.norm() / node.height as f32);
-        self.magnitudes.clear();
-        self.magnitudes.extend(moves);
-        let at = self.magnitudes.len() * 49 / 50;
-        if at == self.magnitudes.len() { 0.0 } else { *self.magnitudes.select_nth_unstable_by(at, f32::total_cmp).1 }
-    }
-
     /// Moves nodes and bends twines as was found.
     pub fn commit(&mut self, graph: &mut Graph) {
         for e in 0..self.twines.len() {
