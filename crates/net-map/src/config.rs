@@ -17,6 +17,8 @@ pub struct Config {
     pub look_max: f64,
     /// A twine is missing below this log likelihood ratio of all its looks, -100 to 0. Default -1.5.
     pub missing_llr: f64,
+    /// One that no frame calls overgrown is missing below this, -100 to 0, if up to three in a row lie between parallel ones that are missing. Default -0.75.
+    pub bridge_llr: f64,
     /// Missing twines are a hole when one of them is below this, -1000 to 0. Default -6.
     pub hole_one_llr: f64,
     /// Or when at least three below -2 come to this together, -1000 to 0. Default -13.
@@ -37,6 +39,7 @@ impl Default for Config {
             look_frames: 20,
             look_max: 8.0,
             missing_llr: -1.5,
+            bridge_llr: -0.75,
             hole_one_llr: -6.0,
             hole_sum_llr: -13.0,
             certain_contrast: 3.0,
@@ -60,6 +63,7 @@ impl Config {
         within("look_frames", f64::from(self.look_frames), 1.0, 1e5, "1 to 100000 frames")?;
         within("look_max", self.look_max, 1.0, 100.0, "1 to 100")?;
         within("missing_llr", self.missing_llr, -100.0, 0.0, "-100 to 0")?;
+        within("bridge_llr", self.bridge_llr, -100.0, 0.0, "-100 to 0")?;
         within("hole_one_llr", self.hole_one_llr, -1000.0, 0.0, "-1000 to 0")?;
         within("hole_sum_llr", self.hole_sum_llr, -1000.0, 0.0, "-1000 to 0")?;
         within("certain_contrast", self.certain_contrast, 0.0, 100.0, "0 to 100 deviations")?;
