@@ -9,6 +9,8 @@
 //! A line per scene, then a table. Wrong: range off by more than 5 %, normal or in-plane rotation by more than 5 degrees. The errors per
 //! degree of freedom are those of the pose against its covariance (6 degrees); with a covariance that holds, their mean is 1.
 
+mod evidence;
+
 use std::time::Instant;
 
 use net_geometry::nalgebra::{UnitQuaternion, Vector2, Vector6};
@@ -126,39 +128,7 @@ impl Tally {
             }
         }
         if let Some(e) = found {
-            let v = &e.evidence;
-            line += &format!(
-                " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3} C {:.2} {:.2} cg {:.2} {:.2} above {:.2} scatter {:.3} {:.3} bumps {:.2}",
-                e.model,
-                e.polarity,
-                v.bend.to_degrees(),
-                v.separable,
-                v.unlike,
-                v.balance,
-                v.cell_snr,
-                v.dissent,
-                v.hidden,
-                v.v[0],
-                v.v[1],
-                v.v2[0],
-                v.v2[1],
-                v.good,
-                v.good_near,
-                v.tiles,
-                v.tiles2,
-                e.margin,
-                e.gain,
-                e.range_sigma / e.range,
-                e.tilt_sigma.to_degrees(),
-                v.comb[0],
-                v.comb[1],
-                v.comb_good,
-                v.comb_near,
-                v.above,
-                v.scatter[0],
-                v.scatter[1],
-                v.bumps.to_degrees(),
-            );
+            line += &evidence::line(e);
         }
         println!("{line}");
     }

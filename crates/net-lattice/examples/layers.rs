@@ -5,6 +5,8 @@
 //! STUDY: `layers` (two nets), or any study of single nets ([`net_sim::Study`]): then every second net is a false one. A line per
 //! scene in which the first net was claimed, then the sums.
 
+mod evidence;
+
 use net_image::Image;
 use net_lattice::{Config, LatticeEstimate, LatticeEstimator};
 use net_sim::{LayerTruth, Simulator, Study};
@@ -78,12 +80,8 @@ fn main() {
             ranges.join(" "),
             truth.layers.first().map_or(0.0, |l| l.contrast_grey.abs()) / truth.noise_grey.max(1e-9),
             second.map_or(String::new(), |e| {
-                let v = &e.evidence;
-                format!(
-                    "{:.3} m p {:.3} before {:.3} {:?} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} sep {:.2} unlike {:.2} dis {:.2}",
-                    e.range, e.probability, v.probability(e.tilt_sigma), e.model, v.v[0], v.v[1], v.v2[0], v.v2[1], v.good, v.good_near,
-                    v.separable, v.unlike, v.dissent
-                )
+                let before = e.evidence.probability(e.tilt_sigma);
+                format!("{:.3} m p {:.3} before {before:.3}{}", e.range, e.probability, evidence::line(&e))
             })
         );
     }

@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release -p net-lattice --example overlay -- FX FY CX CY MESH DIR IMAGE...
 
-#[path = "draw/mod.rs"]
 mod draw;
+mod evidence;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -58,34 +58,16 @@ fn main() {
         let name = Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         match found {
             Ok(Some(e)) => {
-                let v = &e.evidence;
                 println!(
-                    "{name:44} p {:.2} range {:.3} m distance {:.3} tilt {:.1} crossing {:.1} (sd {:.2}) curvatures {:.2} {:.2} {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} sd {:.2} % {:.2} deg margin {:.2} {ms:.0} ms",
+                    "{name:44} p {:.2} range {:.3} m distance {:.3} tilt {:.1} crossing {:.1} (sd {:.2}) curvatures {:.2?}{} {ms:.0} ms",
                     e.probability,
                     e.range,
                     e.pose.plane().distance,
                     e.pose.plane().tilt().to_degrees(),
                     e.crossing_angle.to_degrees(),
                     e.crossing_angle_sigma.to_degrees(),
-                    e.curvatures[0],
-                    e.curvatures[1],
-                    e.model,
-                    e.polarity,
-                    v.bend.to_degrees(),
-                    v.separable,
-                    v.unlike,
-                    v.balance,
-                    v.cell_snr,
-                    v.dissent,
-                    v.v[0],
-                    v.v[1],
-                    v.v2[0],
-                    v.v2[1],
-                    v.good,
-                    v.good_near,
-                    100.0 * e.range_sigma / e.range,
-                    e.tilt_sigma.to_degrees(),
-                    e.margin
+                    e.curvatures,
+                    evidence::line(&e)
                 );
                 draw::overlay(&dir.join(format!("{name}.png")), &gray, &camera, &e);
             }

@@ -4,8 +4,8 @@
 //!
 //! A line per picture, then a table by group. Wrong: range off by 5 %, normal or in-plane rotation by 5 degrees.
 
-#[path = "draw/mod.rs"]
 mod draw;
+mod evidence;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -244,33 +244,7 @@ fn main() {
             s.probability, s.range, s.normal, s.inplane, s.xy_mm, s.crossing, s.z
         );
         if let Some(e) = &found {
-            let v = &e.evidence;
-            println!(
-                " | z {:.3} {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} n {}/{} margin {:.2} gain {:.4} near {:.2} ({}/{}) sd {:.2}% {:.2}deg",
-                e.range,
-                e.model,
-                e.polarity,
-                v.bend.to_degrees(),
-                v.separable,
-                v.unlike,
-                v.balance,
-                v.cell_snr,
-                v.dissent,
-                v.v[0],
-                v.v[1],
-                v.v2[0],
-                v.v2[1],
-                v.good,
-                v.tiles,
-                v.tiles2,
-                e.margin,
-                e.gain,
-                v.good_near,
-                v.near[0],
-                v.near[1],
-                100.0 * e.range_sigma / e.range,
-                e.tilt_sigma.to_degrees()
-            );
+            println!(" | z {:.3}{}", e.range, evidence::line(e));
             if let Some(dir) = &draw {
                 draw::overlay(&dir.join(format!("{name}.png")), &gray, &camera, e);
             }
