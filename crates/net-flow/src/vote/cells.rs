@@ -3,13 +3,10 @@
 use nalgebra::Vector2;
 use net_image::Pyramid;
 
+use super::cell::{CELL, SIDE, dot, knot};
 use super::sample::sample;
 use super::second_lattice::SecondLattice;
 
-/// Samples along a cell's side.
-pub(super) const SIDE: usize = 12;
-/// Numbers of a cell.
-pub(super) const CELL: usize = SIDE * SIDE;
 /// Cells either way whose mean is the lattice.
 const NEIGHBOURS: usize = 3;
 /// A cell takes part when it shows the lattice this strongly, relative to its neighbours: outside are fish and haze.
@@ -199,22 +196,4 @@ impl Layout {
             patch.iter_mut().for_each(|x| *x /= norm);
         }
     }
-}
-
-/// Mean of the middle of a cell.
-fn knot(cell: &[f32; CELL]) -> f32 {
-    const MIDDLE: std::ops::Range<usize> = SIDE / 2 - 2..SIDE / 2 + 2;
-    MIDDLE.flat_map(|v| MIDDLE.map(move |u| cell[v * SIDE + u])).sum::<f32>() / (MIDDLE.len() * MIDDLE.len()) as f32
-}
-
-/// Sum of products in eight lanes.
-#[inline(always)]
-pub(super) fn dot(a: &[f32; CELL], b: &[f32; CELL]) -> f32 {
-    let mut lanes = [0.0f32; 8];
-    for (a, b) in a.as_chunks::<8>().0.iter().zip(b.as_chunks::<8>().0) {
-        for k in 0..8 {
-            lanes[k] += a[k] * b[k];
-        }
-    }
-    lanes.iter().sum()
 }

@@ -8,6 +8,7 @@
 //! A frame in which too few cells can be laid out is *blind*; the next one is compared with the last that was not. A [`CellMap`] keeps what was seen of each cell, to
 //! recognise a place when the net was lost on the way.
 
+mod cell;
 mod cells;
 mod evidence;
 mod recall;

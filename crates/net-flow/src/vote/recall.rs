@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cells::{CELL, Cells};
+use super::cell::CELL;
+use super::cells::Cells;
 use super::score::{BLOCKS, MIN_BLOCK, median};
 use crate::error::{Result, in_range};
 
@@ -233,7 +234,7 @@ impl CellMap {
 
 /// A patch brought to unit length, in 8 bits.
 fn packed(patch: &[f32; CELL]) -> [i8; CELL] {
-    let norm = super::cells::dot(patch, patch).sqrt().max(1e-6);
+    let norm = super::cell::dot(patch, patch).sqrt().max(1e-6);
     // Bounds that i8 holds.
     patch.map(|x| (x / norm * SCALE).round().clamp(-127.0, 127.0) as i8)
 }
@@ -267,7 +268,7 @@ mod tests {
             for (s, x) in patch.iter_mut().enumerate() {
                 *x = random(&mut own) + random(&mut frames) + 0.3 * (s as f32).sin();
             }
-            let norm = super::super::cells::dot(patch, patch).sqrt();
+            let norm = super::super::cell::dot(patch, patch).sqrt();
             patch.iter_mut().for_each(|x| *x /= norm);
         }
         cells

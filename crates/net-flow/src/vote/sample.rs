@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use net_image::{GrayView, widely};
 
-use super::cells::{CELL, SIDE};
+use super::cell::{CELL, SIDE};
 use crate::lanes::{LANES, ROUNDER};
 
 /// Samples along a quarter's side.

@@ -2,7 +2,8 @@
 
 use net_image::widely;
 
-use super::cells::{Cells, MIN_CELLS, dot};
+use super::cell::dot;
+use super::cells::{Cells, MIN_CELLS};
 
 /// Blocks of the common cells, across and down: their median is deaf to a fish that covers two of them.
 pub(super) const BLOCKS: (usize, usize) = (3, 2);

@@ -6,7 +6,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::cells::{CELL, SIDE};
+use super::cell::{CELL, SIDE};
 
 /// Waves are cut down to this many times the median of those of about their length and direction. Of noise a fifth are cut a little; a bent lattice's are spread over
 /// many that are hardly stronger. At 3 three times as many frames with a net behind are in doubt, and at 0.7 noise is raised so far that names slip.
@@ -114,7 +114,7 @@ impl SecondLattice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vote::cells::dot;
+    use crate::vote::cell::dot;
 
     const COLUMNS: usize = 18;
     const ROWS: usize = 12;
