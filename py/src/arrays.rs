@@ -12,6 +12,9 @@ use pyo3::prelude::*;
 
 use crate::camera::of_argument;
 
+/// Most pixels of a picture that is copied because it is no plain array.
+const MOST_PIXELS: usize = 1 << 28;
+
 /// An image argument: grey, borrowed without a copy when the array is C-contiguous; colour is turned to grey.
 pub struct GrayArgument<'py> {
     /// The argument's name, for errors.
@@ -54,6 +57,11 @@ impl<'py> Pixels<'py> {
             }
             let array = gray.as_array();
             let (height, width) = array.dim();
+            // A view may be larger than memory.
+            if width.saturating_mul(height) > MOST_PIXELS {
+                let why = format!("{name}: expected at most {MOST_PIXELS} pixels, got shape ({height}, {width})");
+                return Err(PyValueError::new_err(why));
+            }
             let image = Image::from_vec(array.iter().copied().collect(), width, height);
             return Ok(Self::Converted(image.unwrap_or_default()));
         }

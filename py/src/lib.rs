@@ -23,4 +23,10 @@ mod _core {
     use crate::stages::sim::{SimFrame, render, scenarios};
     #[pymodule_export]
     use crate::tracker::{Tracker, estimate};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

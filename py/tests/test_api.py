@@ -102,6 +102,14 @@ def test_wrong_image_size() -> None:
         npr.flow.match_points(np.zeros((480, 848), np.uint8), np.zeros((50, 100), np.uint8), np.zeros((1, 2)))
 
 
+def test_what_is_larger_than_memory_is_refused() -> None:
+    with pytest.raises(ValueError, match="image: .*pixels"):
+        npr.estimate(np.broadcast_to(np.uint8(7), (2**31, 2**31)), camera(), mesh())
+    for cell in (1e300, 50.0, 1e-9):
+        with pytest.raises(ValueError, match="mesh side"):
+            npr.Mesh.square(cell)
+
+
 def test_time_must_go_forward() -> None:
     tracker = npr.Tracker(camera(), mesh())
     image = np.zeros((480, 848), np.uint8)

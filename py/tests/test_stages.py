@@ -234,3 +234,5 @@ def test_a_flow_tracker_wants_a_size(width: int, height: int) -> None:
         npr.flow.FlowTracker(width, height)
     with pytest.raises(OverflowError, match=noted("width")):
         npr.flow.FlowTracker(-1, 480)
+    with pytest.raises(ValueError, match="width.*16384"):
+        npr.flow.FlowTracker(2**31, 480)

@@ -114,3 +114,55 @@ fn single_images_that_cannot_be_read_do_not_hide_the_others() {
         .collect();
     assert_eq!(status, ["no_net", "unreadable", "no_net"]);
 }
+
+#[test]
+fn a_truth_that_is_no_pose_is_not_taken_for_no_net() {
+    let scratch = Scratch::new();
+    scratch.image_log(2, 48, 32);
+    assert_status(&scratch.run(&[]), 0);
+    let eval = |row: &str| {
+        let text = format!("frame,file,tx,ty,tz,qw,qx,qy,qz\n0,f000.png,0,0,1,1,0,0,0\n1,f001.png,{row}\n");
+        let truth = scratch.write("truth.csv", text);
+        netpose().arg("eval").arg(scratch.path("out")).arg("--truth").arg(truth).output().expect("netpose starts")
+    };
+    for (row, words) in [
+        ("0,0,nan,1,0,0,0", ["line 3", "tz is NaN"]),
+        ("0,0,1,0,0,0,0", ["line 3", "no rotation"]),
+        ("0,0,1,1,0,,0", ["line 3", "empty"]),
+        ("0,0,abc,1,0,0,0", ["line 3", "tz is \"abc\""]),
+    ] {
+        let output = eval(row);
+        assert_status(&output, 1);
+        assert_says(&output, &words);
+    }
+    assert_status(&eval(",,,,,,"), 0);
+}
+
+#[test]
+fn pictures_of_one_name_are_not_drawn_over_each_other() {
+    let scratch = Scratch::new();
+    scratch.image_log(1, 48, 32);
+    let other = scratch.write("other/f000.png", std::fs::read(scratch.path("log/f000.png")).unwrap());
+    let output = netpose()
+        .arg("image")
+        .args([scratch.path("log/f000.png"), other])
+        .arg("--camera")
+        .arg(scratch.path("camera.yaml"))
+        .args(["--cell", "50mm", "--overlay"])
+        .arg(scratch.path("drawn"))
+        .output()
+        .expect("netpose starts");
+    assert_status(&output, 1);
+    assert_says(&output, &["one file", "other"]);
+}
+
+#[test]
+fn a_hundred_thousand_threads_are_refused() {
+    let scratch = Scratch::new();
+    scratch.image_log(1, 48, 32);
+    for jobs in ["0", "100000"] {
+        let output = scratch.run(&["--jobs", jobs]);
+        assert_status(&output, 2);
+        assert_says(&output, &["--jobs", jobs, "1..=256"]);
+    }
+}

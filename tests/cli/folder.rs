@@ -18,6 +18,34 @@ fn a_folder_that_holds_a_run_is_not_overwritten_in_silence() {
     assert_eq!(scratch.poses().len(), 3);
 }
 
+#[cfg(unix)]
+#[test]
+fn two_runs_do_not_write_into_one_folder() {
+    let scratch = Scratch::new();
+    scratch.image_log(3, 48, 32);
+    std::fs::create_dir(scratch.path("out")).unwrap();
+    let other = std::fs::File::open(scratch.path("out")).unwrap();
+    other.lock().unwrap();
+    for more in [&[][..], &["--resume"], &["--force"]] {
+        let output = scratch.run(more);
+        assert_status(&output, 1);
+        assert_says(&output, &["another netpose", "out"]);
+    }
+    drop(other);
+    assert_status(&scratch.run(&[]), 0);
+}
+
+#[test]
+fn a_run_that_failed_before_its_first_frame_is_in_nobodys_way() {
+    let scratch = Scratch::new();
+    scratch.image_log(3, 48, 32);
+    scratch.camera(64, 64);
+    assert_status(&scratch.run(&[]), 1);
+    scratch.camera(48, 32);
+    assert_status(&scratch.run(&[]), 0);
+    assert_eq!(scratch.poses().len(), 3);
+}
+
 #[test]
 fn a_folder_that_cannot_be_made_is_named() {
     let scratch = Scratch::new();

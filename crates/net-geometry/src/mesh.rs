@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result};
 
 /// Two sides and the angle between them. A side is knot to knot, not the stretched mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ impl Mesh {
     /// Square mesh of side `cell`, m.
     ///
     /// # Errors
-    /// [`Error::Value`] if the side is not finite and above zero.
+    /// [`Error::Value`] for a side out of 1 mm to 2 m: `50` is meant as millimetres, not as a net of 50 m meshes.
     pub fn square(cell: f64) -> Result<Self> {
         Self::rectangular(cell, cell)
     }
@@ -24,7 +24,7 @@ impl Mesh {
     /// Rectangular mesh of sides `a` and `b`, m.
     ///
     /// # Errors
-    /// [`Error::Value`] if a side is not finite and above zero.
+    /// [`Error::Value`] for a side out of 1 mm to 2 m.
     pub fn rectangular(a: f64, b: f64) -> Result<Self> {
         Self::oblique(a, b, std::f64::consts::FRAC_PI_2)
     }
@@ -32,10 +32,10 @@ impl Mesh {
     /// Oblique (diamond) mesh of sides `a` and `b`, m, crossing at `angle`, rad, in (0, pi).
     ///
     /// # Errors
-    /// [`Error::Value`] names the side or angle that is out of range.
+    /// [`Error::Value`] names the side (1 mm to 2 m) or angle that is out of range.
     pub fn oblique(a: f64, b: f64, angle: f64) -> Result<Self> {
-        let side1 = positive("mesh side a", a)?;
-        let side2 = positive("mesh side b", b)?;
+        let side1 = side("mesh side a", a)?;
+        let side2 = side("mesh side b", b)?;
         if !(angle.is_finite() && angle > 0.0 && angle < std::f64::consts::PI) {
             return Err(Error::Value { field: "mesh angle", value: angle, expected: "radians between 0 and pi" });
         }
@@ -133,8 +133,13 @@ impl Mesh {
 const MESH_TEXT: &str = "give 50mm, 5cm, 0.05m or 0.05 (metres), 50x40mm for a rectangle, \
      50x50mm@60deg for an oblique mesh (sides from 1 mm to 2 m, angle between 0 and 180 degrees)";
 
-/// Sides taken from text, m: `50` is meant as millimetres, not as a net of 50 m meshes, and `0.05mm` as metres.
-const SIDES_IN_TEXT: std::ops::RangeInclusive<f64> = 0.001..=2.0;
+/// Sides that a net's mesh may have, m.
+const SIDES: std::ops::RangeInclusive<f64> = 0.001..=2.0;
+
+fn side(field: &'static str, value: f64) -> Result<f64> {
+    let expected = "metres from 0.001 to 2 (0.05 for a mesh of 50 mm)";
+    if SIDES.contains(&value) { Ok(value) } else { Err(Error::Value { field, value, expected }) }
+}
 
 /// `50mm`, `5cm`, `0.05m`, `0.05` (metres), `50x40mm`, `50x50mm@60deg`.
 impl std::str::FromStr for Mesh {
@@ -155,7 +160,7 @@ fn parse(text: &str) -> Option<Mesh> {
     let (digits, per_metre) =
         units.into_iter().find_map(|(unit, n)| Some((sizes.trim_end().strip_suffix(unit)?, n)))?;
     let (a, b) = digits.split_once('x').unwrap_or((digits, digits));
-    let side = |digits| number(digits).map(|x| x / per_metre).filter(|x| SIDES_IN_TEXT.contains(x));
+    let side = |digits| number(digits).map(|x| x / per_metre);
     Mesh::oblique(side(a)?, side(b)?, angle).ok()
 }
 

@@ -69,9 +69,12 @@ fn nonsense_is_refused_with_what_would_do() {
 
 #[test]
 fn bad_sides_and_angles_are_named() {
-    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    // 50 is a forgotten unit.
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-9, 50.0, 1e300] {
         assert!(Mesh::square(bad).unwrap_err().to_string().contains("mesh side a"));
         assert!(Mesh::rectangular(1.0, bad).unwrap_err().to_string().contains("mesh side b"));
+    }
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 50.0] {
         assert!(Mesh::oblique(1.0, 1.0, bad).unwrap_err().to_string().contains("mesh angle"));
     }
     assert!(Mesh::oblique(1.0, 1.0, std::f64::consts::PI).is_err());

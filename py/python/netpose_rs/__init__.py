@@ -5,6 +5,6 @@ The net is the plane Z = 0 of its frame, X along the first mesh direction, Z awa
 """
 
 from netpose_rs import fft, flow, junction, sim
-from netpose_rs._core import Camera, Estimate, Layer, Mesh, Tracker, estimate
+from netpose_rs._core import Camera, Estimate, Layer, Mesh, Tracker, __version__, estimate
 
-__all__ = ["Camera", "Estimate", "Layer", "Mesh", "Tracker", "estimate", "fft", "flow", "junction", "sim"]
+__all__ = ["__version__", "Camera", "Estimate", "Layer", "Mesh", "Tracker", "estimate", "fft", "flow", "junction", "sim"]

@@ -5,6 +5,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "__version__",
     "Camera",
     "Mesh",
     "Estimate",
@@ -27,6 +28,8 @@ __all__ = [
     "Tracker",
     "estimate",
 ]
+
+__version__: str
 
 #: uint8, (H, W) grey or (H, W, 3) RGB. A C-contiguous grey array is read in place, without a copy; anything else is packed or converted
 #: to grey once. The GIL is released while it is looked at: do not write into it from another thread meanwhile.
@@ -128,9 +131,11 @@ class Estimate:
     def track(self) -> int:
         """Number of the count of cells: frames of the same number have the same node as origin."""
     @property
-    def connection(self) -> Literal["started", "followed", "recognised", "restarted"]:
-        """How that count goes on from the frames before; of frames with a pose. ``recognised``: the net was lost, and what was seen of
-        its cells before told which ones these are. ``restarted``: it was lost, and a new count began."""
+    def connection(self) -> Literal["started", "followed", "doubted", "settled", "recognised", "restarted"]:
+        """How that count goes on from the frames before; of frames with a pose, but ``doubted`` and ``settled`` of all. ``doubted``: named by
+        the best guess, perhaps off by whole cells, under a number of its own. ``settled``: frames together told what one did not, and the
+        count before the doubt goes on. ``recognised``: the net was lost, and what was seen of its cells before told which ones these are.
+        ``restarted``: it was lost, and a new count began."""
     @property
     def layers(self) -> list[Layer]:
         """All nets that can be vouched for, nearest first, with ``layers=True``; empty without, and with no pose."""

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use netpose::{Camera, Config, Estimate, Mesh, NetPose, Tracker};
 use serde_json::{Value, json};
 
@@ -35,6 +35,12 @@ pub fn main(args: &Args) -> Result<Outcome> {
     let camera = args.setup.camera_flag()?.ok_or_else(camera_unknown)?.camera;
     let overlay = Overlay { camera, mesh };
     if let Some(dir) = &args.overlay {
+        let mut drawn = std::collections::HashMap::new();
+        for path in &args.images {
+            if let Some(other) = drawn.insert(path.file_stem(), path) {
+                bail!("--overlay: {} and {} would be drawn into one file", other.display(), path.display());
+            }
+        }
         std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
     }
     let mut out = std::io::stdout().lock();

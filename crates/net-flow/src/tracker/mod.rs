@@ -20,6 +20,9 @@ use crate::snap::snap;
 use crate::surface::Surface;
 use crate::tracks::{Track, Tracks};
 
+/// Longest side of a picture.
+const LARGEST_PX: usize = 16384;
+
 /// What the caller knows of the coming frame. All of it is optional.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Hints<'a> {
@@ -118,8 +121,8 @@ impl FlowTracker {
     pub fn new(width: usize, height: usize, config: &Config) -> Result<Self> {
         config.validate()?;
         for (field, value) in [("width", width), ("height", height)] {
-            if value == 0 {
-                return Err(Error::Value { field, value: 0.0, expected: "at least one pixel" });
+            if !(1..=LARGEST_PX).contains(&value) {
+                return Err(Error::Value { field, value: value as f64, expected: "1 to 16384 pixels" });
             }
         }
         // The vote wants a fourth.

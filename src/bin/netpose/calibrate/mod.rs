@@ -6,7 +6,6 @@ mod record;
 mod scene;
 mod tables;
 
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -45,8 +44,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Threads. Default: as many as there are processors
-    #[arg(long, value_name = "N")]
-    jobs: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    jobs: Option<u16>,
     /// Markdown instead of plain text
     #[arg(long)]
     markdown: bool,
@@ -60,7 +59,7 @@ pub fn main(args: &Args) -> Result<Outcome> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
     let seeds = args.seed..args.seed.saturating_add(args.scenes);
     let scenes: Vec<(Study, u64)> = chosen.iter().flat_map(|&s| seeds.clone().map(move |seed| (s, seed))).collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, NonZeroUsize::get)).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, usize::from)).build()?;
     let interrupt = Interrupt::listen()?;
     let mut records = Records::create(&args.out.join("calibration.csv"))?;
     let mut progress = Progress::new(Some(scenes.len() as u64));

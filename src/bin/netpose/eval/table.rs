@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use net_geometry::nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use netpose::Pose;
 use serde::Deserialize;
@@ -39,6 +39,24 @@ impl Row {
         (pose.translation.iter().chain(rotation.matrix().iter()).all(|x| x.is_finite())).then_some(pose)
     }
 
+    /// Why the row's pose is none, if it looks like one. No pose at all is no net.
+    fn flaw(&self) -> Option<String> {
+        let columns = ["tx", "ty", "tz", "qw", "qx", "qy", "qz"];
+        let values = [self.tx, self.ty, self.tz, self.qw, self.qx, self.qy, self.qz];
+        let given = || columns.iter().zip(values).filter_map(|(c, v)| Some((c, v?)));
+        if let Some((column, value)) = given().find(|(_, v)| !v.is_finite()) {
+            return Some(format!("{column} is {value}: a finite number, or nothing in all of {}", columns.join(", ")));
+        }
+        match given().count() {
+            0 => None,
+            7 if values[3..].iter().flatten().all(|q| q.abs() < 1e-6) => {
+                Some("qw, qx, qy, qz are 0: no rotation".into())
+            }
+            7 => None,
+            _ => Some(format!("some of {} are empty: a pose has all of them, no pose none", columns.join(", "))),
+        }
+    }
+
     /// Range along the optical axis, m: as written, else from the pose.
     pub fn range(&self) -> Option<f64> {
         self.range_m.or_else(|| self.pose()?.plane().range())
@@ -57,5 +75,24 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
     for column in ["frame", "tx", "ty", "tz", "qw", "qx", "qy", "qz"] {
         ensure!(headers.iter().any(|h| h == column), "{} has no column {column:?}", path.display());
     }
-    reader.deserialize().collect::<Result<_, _>>().with_context(|| format!("cannot read {}", path.display()))
+    let headers = headers.clone();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.with_context(|| format!("cannot read {}", path.display()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let row: Row = record.deserialize(Some(&headers)).map_err(|e| {
+            let field = match e.kind() {
+                csv::ErrorKind::Deserialize { err, .. } => err.field(),
+                _ => None,
+            };
+            let field = field.and_then(|f| usize::try_from(f).ok());
+            let what = field.and_then(|f| Some(format!("{} is {:?}", headers.get(f)?, record.get(f)?)));
+            anyhow::anyhow!("{}, line {line}: {}", path.display(), what.unwrap_or_else(|| e.to_string()))
+        })?;
+        if let Some(flaw) = row.flaw() {
+            bail!("{}, line {line}: {flaw}", path.display());
+        }
+        rows.push(row);
+    }
+    Ok(rows)
 }

@@ -1,13 +1,14 @@
 //! The folder that a run writes: made, resumed or refused; then frame after frame; then closed, however the run ended.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use net_image::Image;
 use net_log::{
-    DEFAULT_CAMERA_FRAME, NetColumns, PoseRow, RawFrame, RowStatus, RunFiles, RunPaths, RunSummary, TimingHistogram,
-    write_report,
+    DEFAULT_CAMERA_FRAME, NetColumns, PoseRow, PoseRows, RawFrame, RowStatus, RunFiles, RunPaths, RunSummary,
+    TimingHistogram, write_report,
 };
 use netpose::{Camera, Connection, NetPose, Status};
 
@@ -44,6 +45,8 @@ pub struct Folder {
     tracking: TimingHistogram,
     writing: TimingHistogram,
     start: Instant,
+    /// Keeps others out of the folder until this is dropped.
+    _lock: Option<File>,
 }
 
 impl Folder {
@@ -51,7 +54,11 @@ impl Folder {
     /// the first frame.
     pub fn prepare(dir: &Path, existing: Existing, camera: Camera, mut summary: RunSummary) -> Result<Self> {
         let paths = RunPaths::new(dir);
-        let holds_a_run = paths.poses().exists() || paths.summary().exists();
+        let lock = lock(dir)?;
+        // A run that failed before its first frame is in nobody's way.
+        let empty =
+            || PoseRows::open(&paths.poses()).is_ok_and(|rows| rows.is_some_and(|mut rows| rows.next().is_none()));
+        let holds_a_run = (paths.poses().exists() || paths.summary().exists()) && !empty();
         if holds_a_run && existing == Existing::Keep {
             bail!("{} already holds a run: --resume goes on with it, --force replaces it", dir.display());
         }
@@ -74,7 +81,19 @@ impl Folder {
         let (decoding, tracking, writing) = Default::default();
         let examples = Examples::default();
         let start = Instant::now();
-        Ok(Self { files, summary, camera, last_frame, first_track, examples, decoding, tracking, writing, start })
+        Ok(Self {
+            files,
+            summary,
+            camera,
+            last_frame,
+            first_track,
+            examples,
+            decoding,
+            tracking,
+            writing,
+            start,
+            _lock: lock,
+        })
     }
 
     /// Number of the last frame that an earlier run did.
@@ -131,6 +150,17 @@ impl Folder {
         let ended = run?;
         reported?;
         Ok(Finished { summary: self.summary, ended, dir: paths.dir })
+    }
+}
+
+/// Makes the folder and keeps other runs out of it; the system lets go of the lock however this process ends. `None` where there are no such locks.
+fn lock(dir: &Path) -> Result<Option<File>> {
+    std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
+    let Ok(folder) = File::open(dir) else { return Ok(None) };
+    match folder.try_lock() {
+        Ok(()) => Ok(Some(folder)),
+        Err(TryLockError::WouldBlock) => bail!("another netpose is writing into {}", dir.display()),
+        Err(TryLockError::Error(_)) => Ok(None),
     }
 }
 

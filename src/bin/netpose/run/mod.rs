@@ -48,8 +48,8 @@ pub struct Args {
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     fps: f64,
     /// Threads that decode frames and draw overlays; results are the same for any number. Default: one for each core
-    #[arg(long, value_name = "N")]
-    jobs: Option<std::num::NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    jobs: Option<u16>,
     /// Write two pictures for each frame into DIR/overlay: the frame with lattice, junctions, axes and status, and its spectrum with peaks and wave
     /// vectors
     #[arg(long)]
