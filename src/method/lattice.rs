@@ -276,7 +276,9 @@ impl LatticeMethod {
                 self.velocity_in_doubt = false;
             }
         }
-        self.velocity_in_doubt &= !counted.proven;
+        // A velocity that frames in doubt have told together is none to rely on before one look bears it out: they may have followed a net behind.
+        let told_together = counted.connection == Connection::Settled && counted.cells != (0, 0);
+        self.velocity_in_doubt = told_together || self.velocity_in_doubt && !counted.proven;
         if counted.cells != (0, 0) {
             let cells = counted.cells;
             let moved = |index: (i32, i32)| (index.0.saturating_add(cells.0), index.1.saturating_add(cells.1));
