@@ -95,7 +95,7 @@ impl CellCount {
         self.track
     }
 
-    /// The next frame with a pose, flattened: the cell at its optical axis, how its nodes were named, whether the frame before had a pose, and where the nodes are.
+    /// The next frame whose lattice is known, flattened: the cell at its optical axis, how its nodes were named, whether the lattice was known in the frame before as well, and where the nodes are.
     pub fn update(
         &mut self,
         picture: &Pyramid,

@@ -117,7 +117,7 @@ impl FlowTracker {
     /// A tracker for pictures of `width` x `height` px.
     ///
     /// # Errors
-    /// [`Error::Value`] for a parameter out of range or a picture without pixels.
+    /// [`Error::Value`] for a parameter out of range, or a side that is not 1 to 16384 px.
     pub fn new(width: usize, height: usize, config: &Config) -> Result<Self> {
         config.validate()?;
         for (field, value) in [("width", width), ("height", height)] {

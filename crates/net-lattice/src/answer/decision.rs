@@ -314,5 +314,7 @@ mod tests {
         let unsure = |degrees: f64| bend(1.0, 1.0).probability(degrees.to_radians());
         assert!(unsure(1.2) > ask, "a normal that is known well enough");
         assert!(unsure(2.5) < ask, "errors as large as the answer may be off");
+        assert!(bend(1.0, 1.0).lattice_probability() > ask, "where the meshes are does not hang on the normal");
+        assert!(random.lattice_probability() < ask, "nor is there a lattice where there is none");
     }
 }
