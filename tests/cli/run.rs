@@ -88,6 +88,36 @@ fn a_camera_file_beside_the_images_is_used_and_named() {
     assert_says(&output, &["camera: ", "camera.yaml"]);
 }
 
+/// As beside a log's images. Each picture has the camera of its own folder.
+#[test]
+fn a_camera_file_beside_single_images_is_used_and_named() {
+    let scratch = Scratch::new();
+    let image = |pictures: &[&str]| {
+        let paths = pictures.iter().map(|p| scratch.path(p));
+        crate::support::netpose().arg("image").args(paths).args(["--cell", "50mm"]).output().unwrap()
+    };
+    for (folder, width) in [("a", 48), ("b", 64)] {
+        scratch.write(&format!("{folder}/1.png"), crate::support::png(width, 32, 1));
+        scratch.write(&format!("{folder}/2.png"), crate::support::png(width, 32, 2));
+        std::fs::rename(scratch.camera(width, 32), scratch.path(folder).join("camera.yaml")).unwrap();
+    }
+    let output = image(&["a/1.png", "b/1.png", "a/2.png", "b/2.png"]);
+    assert_status(&output, 0);
+    assert_says(&output, &["a/camera.yaml", "b/camera.yaml"]);
+    assert_eq!(stderr(&output).matches("camera: ").count(), 2, "{}", stderr(&output));
+    assert_eq!(stdout(&output).matches("no_net").count(), 4);
+    // A bare name is a picture of the folder at hand, and the flag has precedence.
+    let bare = |more: &[&str]| {
+        let mut command = crate::support::netpose();
+        command.current_dir(scratch.path("a")).args(["image", "1.png", "--cell", "50mm"]).args(more);
+        command.output().unwrap()
+    };
+    assert_status(&bare(&[]), 0);
+    let output = bare(&["--camera", "../b/camera.yaml"]);
+    assert_status(&output, 1);
+    assert_says(&output, &["64x32", "48x32"]);
+}
+
 #[test]
 fn overlays_show_every_frame_that_could_be_read() {
     let scratch = Scratch::new();

@@ -13,7 +13,7 @@
 mod camera_info;
 mod kalibr;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use net_geometry::{Camera, Lens};
 
@@ -21,6 +21,14 @@ use crate::error::{Error, Result};
 
 /// Largest calibration file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
+
+/// Name of the calibration that belongs to the images beside it.
+pub const CAMERA_YAML: &str = "camera.yaml";
+
+/// The calibration in `folder` that belongs to the images there, not read: [`CAMERA_YAML`], if there is such a file.
+pub fn camera_beside(folder: &Path) -> Option<PathBuf> {
+    Some(folder.join(CAMERA_YAML)).filter(|path| path.is_file())
+}
 
 /// Reads the camera of a ROS `camera_info` YAML, or of a Kalibr camchain YAML of one camera.
 ///

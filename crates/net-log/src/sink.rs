@@ -13,7 +13,7 @@ mod trajectory;
 
 pub use annotated::{AnnotatedMcap, DEFAULT_CAMERA_FRAME};
 pub use growth::{GrowthParquet, GrowthRow};
-pub use image_log::{CAMERA_YAML, ImageFolderWriter, ImageMcapWriter, png, write_camera_yaml};
+pub use image_log::{ImageFolderWriter, ImageMcapWriter, png, write_camera_yaml};
 pub use junctions::{Junctions, JunctionsParquet, read_junctions};
 pub use poses::{NetColumns, POSES_HEADER, PoseRow, PosesCsv, Resumed, RowStatus};
 pub use poses_reader::{PoseRows, read_poses};

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::draw::{Overlay, Shown};
 use crate::failure::Outcome;
-use crate::options::{Setup, camera_unknown};
+use crate::options::Setup;
 
 /// Where the net is in single images, each on its own.
 #[derive(Debug, clap::Args)]
@@ -32,8 +32,7 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<Outcome> {
     let mesh = args.setup.mesh()?;
     let config = args.setup.config()?;
-    let camera = args.setup.camera_flag()?.ok_or_else(camera_unknown)?.camera;
-    let overlay = Overlay { camera, mesh };
+    let cameras = args.setup.cameras_of(&args.images)?;
     if let Some(dir) = &args.overlay {
         let mut drawn = std::collections::HashMap::new();
         for path in &args.images {
@@ -48,9 +47,8 @@ pub fn main(args: &Args) -> Result<Outcome> {
         writeln!(out, "{HEAD}")?;
     }
     let mut outcome = Outcome::Complete;
-    for path in &args.images {
-        let drawn = args.overlay.as_deref().map(|dir| (dir, &overlay));
-        match estimate(path, &camera, &mesh, &config, drawn, args.json) {
+    for (path, &camera) in args.images.iter().zip(&cameras) {
+        match estimate(path, &camera, &mesh, &config, args.overlay.as_deref(), args.json) {
             Ok(line) => writeln!(out, "{line}")?,
             Err(why) => {
                 outcome = Outcome::Partial;
@@ -72,7 +70,7 @@ fn estimate(
     camera: &Camera,
     mesh: &Mesh,
     config: &Config,
-    overlay: Option<(&Path, &Overlay)>,
+    overlay: Option<&Path>,
     as_json: bool,
 ) -> Result<String> {
     let image = net_log::read_image(path)?;
@@ -81,7 +79,7 @@ fn estimate(
     let start = Instant::now();
     let estimate = tracker.update(view, 0)?;
     let latency_ms = 1e3 * start.elapsed().as_secs_f64();
-    if let Some((dir, overlay)) = overlay {
+    if let Some(dir) = overlay {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
         let shown = Shown {
             status: estimate.status,
@@ -92,7 +90,7 @@ fn estimate(
             latency_ms,
         };
         let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
-        overlay.write(view, &name, &shown, dir, &stem)?;
+        Overlay { camera: *camera, mesh: *mesh }.write(view, &name, &shown, dir, &stem)?;
     }
     Ok(if as_json { json_line(path, &estimate, latency_ms) } else { row(path, &estimate, latency_ms) })
 }

@@ -1,6 +1,7 @@
 //! What several commands must know: camera, mesh, parameters.
 
-use std::path::PathBuf;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use net_log::LogInfo;
@@ -11,7 +12,8 @@ use crate::failure::Usage;
 /// Camera, mesh and parameters.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Setup {
-    /// Calibration: ROS camera_info YAML (as camera_calibration writes it) or Kalibr camchain YAML. Default: what the log says
+    /// Calibration: ROS camera_info YAML (as camera_calibration writes it) or Kalibr camchain YAML. Default: what the log says,
+    /// else camera.yaml beside the images
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Mesh, knot to knot: 50mm, 5cm, 0.05m or 0.05 (metres); 50x40mm for a rectangle; 50x50mm@60deg for an oblique mesh
@@ -65,20 +67,41 @@ impl Setup {
                 }
             };
         }
-        if let Some(path) = &log.camera_file {
-            return from_file(path);
+        known_or_asked_for(log.camera_file.as_deref())
+    }
+
+    /// The cameras of single pictures: from the flag, else each from a `camera.yaml` beside it, which is said on standard error.
+    pub fn cameras_of(&self, pictures: &[PathBuf]) -> Result<Vec<Camera>> {
+        if let Some(known) = self.camera_flag()? {
+            return Ok(vec![known.camera; pictures.len()]);
         }
-        Err(camera_unknown())
+        let mut by_folder = HashMap::new();
+        let mut cameras = Vec::with_capacity(pictures.len());
+        for picture in pictures {
+            let folder = picture.parent().unwrap_or(Path::new(""));
+            let camera = match by_folder.get(folder) {
+                Some(&camera) => camera,
+                None => {
+                    let known = known_or_asked_for(net_log::camera_beside(folder).as_deref())?;
+                    eprintln!("camera: {}", known.origin);
+                    by_folder.insert(folder, known.camera);
+                    known.camera
+                }
+            };
+            cameras.push(camera);
+        }
+        Ok(cameras)
     }
 }
 
-/// The camera is not known, and which flag gives it.
-pub fn camera_unknown() -> anyhow::Error {
-    let unknown = "the camera is not known: give its calibration with --camera FILE (ROS camera_info YAML or Kalibr camchain YAML)";
-    Usage(unknown.into()).into()
+/// The camera of a file that was found, or which flag gives it.
+fn known_or_asked_for(found: Option<&Path>) -> Result<KnownCamera> {
+    let unknown = "the camera is not known: give its calibration with --camera FILE (ROS camera_info YAML or Kalibr camchain YAML), \
+                   or put it beside the images as camera.yaml";
+    found.map_or_else(|| Err(Usage(unknown.into()).into()), from_file)
 }
 
-fn from_file(path: &std::path::Path) -> Result<KnownCamera> {
+fn from_file(path: &Path) -> Result<KnownCamera> {
     let camera = net_log::read_camera(path).context("camera")?;
     Ok(KnownCamera { camera, origin: path.display().to_string() })
 }

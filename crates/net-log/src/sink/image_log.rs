@@ -11,12 +11,10 @@ use net_geometry::{Camera, Lens};
 use net_image::GrayView;
 use re_cdr::{CdrWriter, LittleEndian};
 
+use crate::calibration::CAMERA_YAML;
 use crate::error::{Error, Result};
 use crate::sink::annotated::failed;
 use crate::source::TIMESTAMPS_CSV;
-
-/// Name of the camera file in an image folder.
-pub const CAMERA_YAML: &str = "camera.yaml";
 
 /// Writes a folder of PNG images with `timestamps.csv` and `camera.yaml`.
 #[derive(Debug)]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::calibration::camera_beside;
 use crate::error::{Error, Result};
 use crate::frame::{FrameError, Payload, RawFrame};
 use crate::log::{LogInfo, LogKind, OpenOptions, TimeSource};
@@ -60,7 +61,7 @@ impl ImageFolder {
             }
         };
         let known = || times.iter().flatten().copied();
-        let camera_file = Some(path.join("camera.yaml")).filter(|p| p.is_file());
+        let camera_file = camera_beside(path);
         let info = LogInfo {
             path: path.to_owned(),
             kind: LogKind::ImageFolder,
