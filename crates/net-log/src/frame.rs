@@ -7,6 +7,7 @@ use net_image::Image;
 
 use crate::message::ImageType;
 use crate::picture;
+use crate::source::TIMESTAMPS_CSV;
 
 /// Why one frame can't be used. The log goes on behind it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -62,23 +63,32 @@ pub enum FrameError {
         why: String,
     },
     /// The frame's time does not come after that of the frame before it.
-    #[error("its time, {timestamp_ns} ns, does not come after {previous_ns} ns, the time of frame {previous}")]
+    #[error("its time, {timestamp_ns} ns{}, does not come after {previous_ns} ns, the time of frame {previous}", told_in(*line))]
     TimeOrder {
         /// This frame's time, ns.
         timestamp_ns: i64,
+        /// Line of `timestamps.csv` that tells it, if it is told there.
+        line: Option<u64>,
         /// The last frame that was in order.
         previous: u64,
         /// Its time, ns.
         previous_ns: i64,
     },
     /// The time is ahead of that of all frames around it.
-    #[error("its time, {timestamp_ns} ns, is ahead of the frame after it, {next_ns} ns")]
+    #[error("its time, {timestamp_ns} ns{}, is ahead of the frame after it, {next_ns} ns", told_in(*line))]
     TimeAhead {
         /// This frame's time, ns.
         timestamp_ns: i64,
+        /// Line of `timestamps.csv` that tells it, if it is told there.
+        line: Option<u64>,
         /// The time of the frame after it, ns.
         next_ns: i64,
     },
+}
+
+/// Where a time stands, in brackets behind it.
+fn told_in(line: Option<u64>) -> String {
+    line.map_or_else(String::new, |line| format!(" ({TIMESTAMPS_CSV}, line {line})"))
 }
 
 /// A frame that has been read or located, but not decoded: cheap to make in order, to be decoded in any thread.
@@ -90,6 +100,8 @@ pub struct RawFrame {
     pub name: Arc<str>,
     /// Time of exposure, ns since the Unix epoch. `None` only where [`RawFrame::decode`] fails.
     pub timestamp_ns: Option<i64>,
+    /// Line of `timestamps.csv` that tells it.
+    pub(crate) time_line: Option<u64>,
     pub(crate) payload: Payload,
 }
 

@@ -35,8 +35,9 @@ impl<S: Source> Iterator for TimeOrder<S> {
         let mut frame = self.ahead.take().or_else(|| self.source.next())?;
         self.ahead = self.source.next();
         let Some(timestamp_ns) = frame.timestamp_ns else { return Some(frame) };
+        let line = frame.time_line;
         if let Some((previous, previous_ns)) = self.last.filter(|&(_, ns)| timestamp_ns <= ns) {
-            frame.refuse(FrameError::TimeOrder { timestamp_ns, previous, previous_ns });
+            frame.refuse(FrameError::TimeOrder { timestamp_ns, line, previous, previous_ns });
             return Some(frame);
         }
         let next_ns = self.ahead.as_ref().and_then(|f| f.timestamp_ns);
@@ -45,7 +46,7 @@ impl<S: Source> Iterator for TimeOrder<S> {
             && previous_ns < next_ns
             && next_ns < timestamp_ns
         {
-            frame.refuse(FrameError::TimeAhead { timestamp_ns, next_ns });
+            frame.refuse(FrameError::TimeAhead { timestamp_ns, line, next_ns });
             return Some(frame);
         }
         if !frame.is_refused() {

@@ -131,8 +131,38 @@ fn times_out_of_order() {
     let frame = &frames(dir.path())[3];
     assert_eq!(frame.timestamp_ns, Some(1));
     let error = frame.decode().unwrap_err();
-    assert_eq!(error, FrameError::TimeOrder { timestamp_ns: 1, previous: 2, previous_ns: 9 });
-    assert!(error.to_string().contains("does not come after 9 ns, the time of frame 2"), "{error}");
+    assert_eq!(error, FrameError::TimeOrder { timestamp_ns: 1, line: Some(5), previous: 2, previous_ns: 9 });
+    assert!(error.to_string().contains("1 ns (timestamps.csv, line 5), does not come after 9 ns, the time of frame 2"));
+}
+
+/// The table's names are those of the folder, however they are written; what lies outside is never opened.
+#[test]
+fn paths_in_a_table_stay_in_the_folder() {
+    let dir = folder(&["a.png", "b.png"]);
+    let log = dir.path().join("log");
+    std::fs::create_dir_all(log.join("sub")).unwrap();
+    for name in ["a.png", "b.png", "c.png", "sub/d.png"] {
+        std::fs::write(log.join(name), png(&picture(8, 6, 0))).unwrap();
+    }
+    let outside = dir.path().join("b.png");
+    let outside = outside.to_str().unwrap();
+    let table = format!(
+        "file,timestamp_ns\n./a.png,1\nb.png,2\n././/b.png,3\n./c.png\nsub/./d.png,5\n../a.png,6\n{outside},7\n,8\n"
+    );
+    std::fs::write(log.join("timestamps.csv"), table).unwrap();
+    let frames = frames(&log);
+    let why = |name: &str| {
+        let frame = frames.iter().find(|f| &*f.name == name).unwrap_or_else(|| panic!("{name}: {:?}", names(&frames)));
+        frame.decode().map(|_| frame.timestamp_ns).map_err(|e| e.to_string())
+    };
+    assert_eq!(frames.len(), 7, "{:?}", names(&frames));
+    assert_eq!((why("a.png"), why("sub/d.png")), (Ok(Some(1)), Ok(Some(5))));
+    assert!(why("b.png").unwrap_err().contains("two times, the second in line 4"));
+    assert!(why("c.png").unwrap_err().contains("line 5 has no time"));
+    for (name, line) in [("../a.png", 7), (outside, 8), ("", 9)] {
+        let why = why(name).unwrap_err();
+        assert!(why.contains(&format!("timestamps.csv, line {line}: {name:?} is no file of this folder")), "{why}");
+    }
 }
 
 #[test]

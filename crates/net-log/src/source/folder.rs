@@ -17,8 +17,17 @@ const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "jpe", "tif", "tiff", "b
 /// The frames of a folder, in natural order of their names.
 pub(crate) struct ImageFolder {
     path: PathBuf,
-    frames: std::vec::IntoIter<(String, std::result::Result<i64, FrameError>)>,
+    frames: std::vec::IntoIter<(String, std::result::Result<Timed, FrameError>)>,
     next_index: u64,
+}
+
+/// A frame's time.
+#[derive(Debug, Clone, Copy)]
+struct Timed {
+    /// Since the Unix epoch, ns.
+    ns: i64,
+    /// Line of `timestamps.csv` that tells it.
+    line: Option<u64>,
 }
 
 impl ImageFolder {
@@ -43,7 +52,7 @@ impl ImageFolder {
             (Some(table), _) => {
                 let missing = || FrameError::NoTime { why: format!("{TIMESTAMPS_CSV} does not name it") };
                 let time = |name| match table.get(name) {
-                    Some(Ok(time)) => Ok(*time),
+                    Some(Ok(told)) => Ok(Timed { ns: told.ns, line: Some(told.line) }),
                     Some(Err(why)) => Err(FrameError::NoTime { why: why.clone() }),
                     None => Err(missing()),
                 };
@@ -53,14 +62,15 @@ impl ImageFolder {
                 let none = || FrameError::NoTime {
                     why: "its name is not a time in ns, as those of the others are".to_owned(),
                 };
-                (times.into_iter().map(|t| t.ok_or_else(none)).collect(), TimeSource::FileNames)
+                let time = |time: Option<i64>| time.map(|ns| Timed { ns, line: None }).ok_or_else(none);
+                (times.into_iter().map(time).collect(), TimeSource::FileNames)
             }
             (None, None) => {
-                let time = |i: usize| Ok((i as f64 * 1e9 / options.fps).round() as i64);
+                let time = |i: usize| Ok(Timed { ns: (i as f64 * 1e9 / options.fps).round() as i64, line: None });
                 ((0..names.len()).map(time).collect(), TimeSource::MadeUp { fps: options.fps })
             }
         };
-        let known = || times.iter().flatten().copied();
+        let known = || times.iter().flatten().map(|time| time.ns);
         let camera_file = camera_beside(path);
         let info = LogInfo {
             path: path.to_owned(),
@@ -85,12 +95,15 @@ impl Iterator for ImageFolder {
         let (name, time) = self.frames.next()?;
         let index = self.next_index;
         self.next_index += 1;
-        let timestamp_ns = time.as_ref().ok().copied();
+        let (timestamp_ns, time_line) = match &time {
+            Ok(time) => (Some(time.ns), time.line),
+            Err(_) => (None, None),
+        };
         let payload = match time {
             Ok(_) => Payload::File(self.path.join(&name)),
             Err(error) => Payload::Refused(error),
         };
-        Some(RawFrame { index, name: Arc::from(name), timestamp_ns, payload })
+        Some(RawFrame { index, name: Arc::from(name), timestamp_ns, time_line, payload })
     }
 }
 

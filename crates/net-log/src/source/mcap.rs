@@ -238,7 +238,13 @@ impl Iterator for McapFrames {
                 Event::Lost { channel, messages, why } if channels.contains_key(&channel) => {
                     for index in self.next_index..self.next_index + messages {
                         let payload = Payload::Refused(FrameError::Read { why: why.to_owned() });
-                        self.ready.push_back(RawFrame { index, name: self.topic.clone(), timestamp_ns: None, payload });
+                        self.ready.push_back(RawFrame {
+                            index,
+                            name: self.topic.clone(),
+                            timestamp_ns: None,
+                            time_line: None,
+                            payload,
+                        });
                     }
                     self.next_index += messages;
                 }
@@ -268,17 +274,26 @@ impl Iterator for McapFrames {
 /// A message as a frame, timed by its header, or by its logging where that is zero.
 fn frame(index: u64, topic: &Arc<str>, kind: ImageType, log_time: u64, data: &[u8]) -> RawFrame {
     let (name, logged) = (topic.clone(), i64::try_from(log_time).ok());
-    let refused =
-        |error| RawFrame { index, name: name.clone(), timestamp_ns: logged, payload: Payload::Refused(error) };
+    let refused = |error| RawFrame {
+        index,
+        name: name.clone(),
+        timestamp_ns: logged,
+        time_line: None,
+        payload: Payload::Refused(error),
+    };
     match kind.stamp(data) {
         Err(error) => refused(error),
         Ok(stamp) => match Some(stamp).filter(|&s| s != 0).or(logged) {
             None => refused(FrameError::NoTime {
                 why: format!("its time of logging, {log_time} ns, is beyond the year 2262"),
             }),
-            time => {
-                RawFrame { index, name, timestamp_ns: time, payload: Payload::Message { kind, data: data.to_vec() } }
-            }
+            time => RawFrame {
+                index,
+                name,
+                timestamp_ns: time,
+                time_line: None,
+                payload: Payload::Message { kind, data: data.to_vec() },
+            },
         },
     }
 }

@@ -1,7 +1,7 @@
 //! Times of an image folder: from `timestamps.csv`, from the names, or made up.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Component, Path};
 
 use serde::Deserialize;
 
@@ -17,8 +17,17 @@ struct Row {
     timestamp_ns: String,
 }
 
+/// A time that the table gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Told {
+    /// Since the Unix epoch, ns.
+    pub ns: i64,
+    /// Line of the table, from 1.
+    pub line: u64,
+}
+
 /// Time by file name, or why the table has none that can be used.
-pub(crate) type Times = BTreeMap<String, std::result::Result<i64, String>>;
+pub(crate) type Times = BTreeMap<String, std::result::Result<Told, String>>;
 
 /// Reads `timestamps.csv`. A line that gives no time spoils its own frame only; a table without the two columns is an error.
 pub(crate) fn read_csv(path: &Path) -> Result<Times> {
@@ -41,19 +50,42 @@ pub(crate) fn read_csv(path: &Path) -> Result<Times> {
         // Too few cells: most often a last line that was never finished.
         let Ok(row) = record.deserialize::<Row>(Some(&headers)) else {
             if let Some(file) = record.get(headers.iter().position(|h| h == "file").unwrap_or(0)) {
-                times.insert(file.to_owned(), Err(format!("{TIMESTAMPS_CSV}, line {line} has no time")));
+                let file = name_in_folder(file).unwrap_or_else(|| file.to_owned());
+                times.insert(file, Err(format!("{TIMESTAMPS_CSV}, line {line} has no time")));
             }
             continue;
         };
-        let time = row.timestamp_ns.parse::<i64>().map_err(|_| {
+        let Some(file) = name_in_folder(&row.file) else {
+            let why = format!("{TIMESTAMPS_CSV}, line {line}: {:?} is no file of this folder", row.file);
+            times.insert(row.file, Err(why));
+            continue;
+        };
+        let time = row.timestamp_ns.parse().map(|ns| Told { ns, line }).map_err(|_| {
             format!("{TIMESTAMPS_CSV}, line {line}: {:?} is not a whole number of nanoseconds", row.timestamp_ns)
         });
-        let twice = times.get(&row.file).is_some_and(|before| *before != time);
+        let same = |before: &std::result::Result<Told, String>| match (before, &time) {
+            (Ok(before), Ok(now)) => before.ns == now.ns,
+            _ => false,
+        };
+        let twice = times.get(&file).is_some_and(|before| !same(before));
         let time =
             if twice { Err(format!("{TIMESTAMPS_CSV} gives it two times, the second in line {line}")) } else { time };
-        times.insert(row.file, time);
+        times.insert(file, time);
     }
     Ok(times)
+}
+
+/// The name of a file as the folder's listing has it: `./f.png` is `f.png`. `None` for none, and for a path that leaves the folder.
+fn name_in_folder(path: &str) -> Option<String> {
+    let mut parts = Vec::new();
+    for part in Path::new(path).components() {
+        match part {
+            Component::CurDir => {}
+            Component::Normal(name) => parts.push(name.to_str()?),
+            Component::ParentDir | Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    (!parts.is_empty()).then(|| parts.join("/"))
 }
 
 /// Times from names that are whole nanoseconds, `None` if these are not such names.
