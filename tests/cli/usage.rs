@@ -60,6 +60,14 @@ fn flags_that_contradict_each_other_or_the_log_are_wrong_usage() {
     assert_status(&output, 2);
     assert_says(&output, &["--fps is 0"]);
     assert!(!scratch.path("out").exists());
+    // A folder of images has no topics.
+    let output = scratch.run(&["--topic", "/camera"]);
+    assert_status(&output, 2);
+    assert_says(&output, &["--topic is \"/camera\"", "a folder of images has none"]);
+    let output = netpose().arg("info").arg(scratch.path("log")).args(["--topic", "/camera"]).output().unwrap();
+    assert_status(&output, 2);
+    assert_says(&output, &["--topic is \"/camera\""]);
+    assert!(!scratch.path("out").exists());
     // Results among the images would be part of the log the next time. Whatever the path's spelling.
     let before = std::fs::read_dir(scratch.path("log")).unwrap().count();
     let output = netpose()

@@ -13,7 +13,7 @@ use crate::time_order::TimeOrder;
 /// What to read of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenOptions {
-    /// Image topic of an MCAP; needed only where there are several. Ignored for image folders.
+    /// Image topic of an MCAP; needed only where there are several, and refused for a folder of images, which has none.
     pub topic: Option<String>,
     /// Frames per second of an image folder that has no times, Hz. Default 10, as the command line promises.
     pub fps: f64,
@@ -182,7 +182,7 @@ impl std::fmt::Debug for Log {
 ///
 /// # Errors
 /// [`Error::NotALog`] and [`Error::Io`] name the path; [`Error::SeveralTopics`] lists the topics to choose from;
-/// [`Error::Value`] for a frame rate that is not above zero.
+/// [`Error::Value`] for a frame rate that is not above zero, or a topic of a folder of images.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Log> {
     let (info, source) = source::open(path, options)?;
     let selection = Selection { options: options.clone(), bounds: None, in_range: options.from.is_none(), taken: 0 };

@@ -66,7 +66,14 @@ fn find(path: &Path, options: &OpenOptions) -> Result<Found> {
     let mcaps = mcap_files(path)?;
     let images = folder::ImageFolder::open(path, options);
     match (mcaps.is_empty(), images) {
-        (true, images) => images.map(|(info, frames)| Found::Images(Box::new(info), frames)),
+        (true, images) => {
+            let (info, frames) = images?;
+            if let Some(topic) = &options.topic {
+                let expected = "the image topic of an MCAP; a folder of images has none, leave it out";
+                return Err(Error::Value { field: "topic", value: format!("{topic:?}"), expected });
+            }
+            Ok(Found::Images(Box::new(info), frames))
+        }
         (false, Err(_)) => mcap::McapLog::open(path, &mcaps).map(Found::Mcap),
         (false, Ok((info, _))) => {
             let (images, mcaps) = (info.frames.unwrap_or(0), mcaps.len());

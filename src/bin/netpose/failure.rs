@@ -14,6 +14,15 @@ impl std::fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
+/// A log that cannot be opened by these flags: a topic that must be chosen or is not there, and a value out of range, are wrong usage.
+pub fn as_usage(error: net_log::Error) -> anyhow::Error {
+    match error {
+        net_log::Error::Value { field, value, expected } => Usage(format!("--{field} is {value}: {expected}")).into(),
+        net_log::Error::SeveralTopics { .. } | net_log::Error::NoSuchTopic { .. } => Usage(error.to_string()).into(),
+        other => other.into(),
+    }
+}
+
 /// What a finished command says of its input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {

@@ -7,14 +7,14 @@ use net_log::{LogInfo, OpenOptions};
 use serde_json::{Value, json};
 
 use crate::describe;
-use crate::failure::Outcome;
+use crate::failure::{Outcome, as_usage};
 
 /// What a log is: kind, frames, times, topics, camera.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A folder of images, an MCAP file or a folder of MCAP files
     log: PathBuf,
-    /// Image topic to look at, where there are several
+    /// Image topic of an MCAP to look at, where there are several
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
     /// One JSON document instead of text
@@ -25,7 +25,7 @@ pub struct Args {
 /// Runs the command.
 pub fn main(args: &Args) -> Result<Outcome> {
     let options = OpenOptions { topic: args.topic.clone(), ..OpenOptions::default() };
-    let info = net_log::inspect(&args.log, &options)?;
+    let info = net_log::inspect(&args.log, &options).map_err(as_usage)?;
     let size = first_size(args, &options);
     if args.json {
         println!("{}", serde_json::to_string_pretty(&as_json(&info, size))?);

@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail};
 use net_log::{LogInfo, LogSummary, OpenOptions, RunSummary, TimeBound};
 
 use crate::describe::{self, times};
-use crate::failure::{Outcome, Usage};
+use crate::failure::{Outcome, Usage, as_usage};
 use crate::interrupt::Interrupt;
 use crate::options::Setup;
 pub use count::{Counted, HEADER as COUNT_HEADER};
@@ -109,15 +109,6 @@ pub fn main(args: &Args) -> Result<Outcome> {
         println!("{}", crate::smooth::smooth_run(&args.out, Some(&args.log), &net_track::Config::default())?);
     }
     Ok(finished.outcome())
-}
-
-/// A topic that must be chosen or is not there, and a value out of range, are matters of flags.
-fn as_usage(error: net_log::Error) -> anyhow::Error {
-    match error {
-        net_log::Error::Value { field, value, expected } => Usage(format!("--{field} is {value}: {expected}")).into(),
-        net_log::Error::SeveralTopics { .. } | net_log::Error::NoSuchTopic { .. } => Usage(error.to_string()).into(),
-        other => other.into(),
-    }
 }
 
 impl Args {
