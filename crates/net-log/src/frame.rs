@@ -1,5 +1,6 @@
 //! Frames as a log yields them: undecoded, in order, with index, name and time.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -128,7 +129,7 @@ impl RawFrame {
     /// [`FrameError`]: the frame is to be counted as unreadable, the log goes on.
     pub fn decode(&self) -> Result<Image<u8>, FrameError> {
         match &self.payload {
-            Payload::File(path) => read_image(path),
+            Payload::File(path) => check_regular(path).map_err(failed).and_then(|()| read_image(path)),
             Payload::Message { kind, data } => kind.decode(data),
             Payload::Refused(error) => Err(error.clone()),
         }
@@ -157,12 +158,29 @@ pub fn read_image(path: &Path) -> Result<Image<u8>, FrameError> {
 
 /// A whole file, unless it is too large to be a picture.
 fn read(path: &Path) -> Result<Vec<u8>, FrameError> {
-    let failed = |e: std::io::Error| FrameError::Read { why: e.to_string() };
-    let length = std::fs::metadata(path).map_err(failed)?.len();
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    let length = file.metadata().map_err(failed)?.len();
+    let too_long = |bytes: &str| FrameError::Read {
+        why: format!("{bytes} bytes are more than the limit of {}", picture::MAX_BYTES),
+    };
     if length > picture::MAX_BYTES {
-        return Err(FrameError::Read {
-            why: format!("{length} bytes are more than the limit of {}", picture::MAX_BYTES),
-        });
+        return Err(too_long(&length.to_string()));
     }
-    std::fs::read(path).map_err(failed)
+    // A pipe or a device tells no length.
+    bytes.reserve(length as usize);
+    file.take(picture::MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > picture::MAX_BYTES { Err(too_long("its")) } else { Ok(bytes) }
+}
+
+fn failed(error: std::io::Error) -> FrameError {
+    FrameError::Read { why: error.to_string() }
+}
+
+/// Refuses what is no regular file, unopened: to open a pipe waits for somebody who writes into it, and nothing can stop that.
+pub(crate) fn check_regular(path: &Path) -> std::io::Result<()> {
+    if std::fs::metadata(path)?.is_file() {
+        return Ok(());
+    }
+    Err(std::io::Error::other("it is no regular file"))
 }

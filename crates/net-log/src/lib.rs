@@ -22,8 +22,8 @@
 //!
 //! | what | from | fails |
 //! |---|---|---|
-//! | frames of a folder | files that are images by ending or first bytes, in natural order, and those that `timestamps.csv` names | a file that is gone, cut off, of unknown format or beyond 100 Mpx: that frame. No image at all: error |
-//! | their times | `timestamps.csv` (`file,timestamp_ns`); or names that are whole nanoseconds; or frame number over `fps`, which [`TimeSource::MadeUp`] says | a line without a time, a file without a line, two times for a file: that frame. A table without the two columns: error |
+//! | frames of a folder | files that are images by ending or first bytes, in natural order, and those that `timestamps.csv` names | a file that is gone, cut off, no regular file, outside the folder, of unknown format or beyond 100 Mpx: that frame. No image at all: error |
+//! | their times | `timestamps.csv` (`file,timestamp_ns`); or names that are whole nanoseconds; or frame number over `fps`, which [`TimeSource::MadeUp`] says | a line without a time, a file without a line, two times for a file: that frame. A table without the two columns, or that is no regular file: error |
 //! | frames of an MCAP, or of a folder of them | ROS 2 and ROS 1 `Image`, `CompressedImage`; Foxglove `RawImage`, `CompressedImage` (protobuf, JSON); chunks zstd, lz4 or plain; messages zstd; with or without a summary | a message that does not parse, an encoding that is not known: that frame. A chunk whose checksum is wrong: its frames. A file cut off: read to its last whole message. Several image topics and none chosen: error that lists them |
 //! | their times | the message's header; the time of logging where the header's is zero | beyond 2262: that frame |
 //! | order of times | every kind of log | a time that does not come after that of the frame before: that frame; where one frame is ahead of all around it, it is that one |

@@ -8,7 +8,7 @@ mod timestamps;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::frame::RawFrame;
+use crate::frame::{RawFrame, check_regular};
 use crate::log::{LogInfo, OpenOptions};
 use crate::picture;
 pub(crate) use timestamps::TIMESTAMPS_CSV;
@@ -118,9 +118,10 @@ fn mcap_files(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(names.into_iter().map(|n| path.join(n)).collect())
 }
 
-/// Enough of a file's beginning to tell what it is.
+/// Enough of a regular file's beginning to tell what it is.
 fn first_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     use std::io::Read;
+    check_regular(path)?;
     let mut first = Vec::new();
     std::fs::File::open(path)?.take(16).read_to_end(&mut first)?;
     Ok(first)

@@ -280,6 +280,33 @@ fn broken_pictures_are_unreadable_frames_and_the_rest_stands() {
     }
 }
 
+/// To open a pipe that nobody writes into waits for ever. Where this fails it does not end.
+#[cfg(unix)]
+#[test]
+fn pipes_are_not_opened() {
+    let dir = folder(&["a.png", "c.png"]);
+    let pipe = |name: &str| {
+        let path = dir.path().join(name);
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        path
+    };
+    pipe("b.png");
+    pipe("no ending");
+    std::os::unix::fs::symlink(pipe("elsewhere"), dir.path().join("link.png")).unwrap();
+    let frames = frames(dir.path());
+    assert_eq!(names(&frames), ["a.png", "b.png", "c.png", "link.png"]);
+    assert_eq!(frames.iter().map(|f| f.decode().is_ok()).collect::<Vec<_>>(), [true, false, true, false]);
+    let why = frames[1].decode().unwrap_err().to_string();
+    assert!(why.contains("it is no regular file"), "{why}");
+    let refusal = |path: &Path| open(path, &OpenOptions::default()).unwrap_err().to_string();
+    for log in [pipe("log.mcap"), pipe("log")] {
+        assert!(refusal(&log).contains("it is no regular file"), "{}", refusal(&log));
+    }
+    // A pipe of times is no reason to make them up.
+    pipe("timestamps.csv");
+    assert!(refusal(dir.path()).contains("timestamps.csv: it is no regular file"), "{}", refusal(dir.path()));
+}
+
 #[test]
 fn sizes_that_no_camera_has_are_refused_before_memory_is_asked_for() {
     // A PNG header of 2^31 - 1 px squared; a BMP header of 60,000 px squared.

@@ -39,7 +39,7 @@ impl ImageFolder {
         }
         let mut names = image_names(path)?;
         let table = path.join(TIMESTAMPS_CSV);
-        let table = if table.is_file() { Some(timestamps::read_csv(&table)?) } else { None };
+        let table = if table.exists() { Some(timestamps::read_csv(&table)?) } else { None };
         // A file that the table names and that is gone is a frame all the same, an unreadable one.
         let gone: Vec<String> = table.iter().flat_map(|t| t.keys()).filter(|n| !names.contains(*n)).cloned().collect();
         names.extend(gone);

@@ -6,6 +6,7 @@ use std::path::{Component, Path};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::frame::check_regular;
 
 /// Name of the table of times.
 pub(crate) const TIMESTAMPS_CSV: &str = "timestamps.csv";
@@ -31,6 +32,7 @@ pub(crate) type Times = BTreeMap<String, std::result::Result<Told, String>>;
 
 /// Reads `timestamps.csv`. A line that gives no time spoils its own frame only; a table without the two columns is an error.
 pub(crate) fn read_csv(path: &Path) -> Result<Times> {
+    check_regular(path).map_err(Error::io("read", path))?;
     let table = |line: u64, why: String| Error::Table { path: path.to_owned(), line, why };
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
