@@ -103,6 +103,22 @@ fn a_configuration_with_an_unknown_key_is_refused_by_its_name() {
     assert_says(&output, &["config.toml", "metod", "method"]);
 }
 
+/// A search for nothing would end as "no net" in every picture.
+#[test]
+fn a_configuration_that_can_find_nothing_is_refused_by_field_and_value() {
+    let scratch = Scratch::new();
+    scratch.image_log(1, 32, 24);
+    for (table, field) in
+        [("search", "candidates_per_section"), ("search", "fits"), ("search", "pairs"), ("section.score", "max_peaks")]
+    {
+        let config = scratch.write("config.toml", format!("method = \"thesis\"\n[thesis.{table}]\n{field} = 0\n"));
+        let output = scratch.run(&["--config", config.to_str().unwrap()]);
+        assert_status(&output, 2);
+        assert_says(&output, &["config.toml", &format!("{field} is 0: 1 or more")]);
+    }
+    assert!(!scratch.path("out").exists());
+}
+
 #[test]
 fn help_names_every_command_and_the_exit_status() {
     let output = netpose().arg("--help").output().unwrap();

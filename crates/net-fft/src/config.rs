@@ -122,7 +122,12 @@ mod tests {
         refused(|c| c.working_height_px = 0, "working_height_px is 0");
         refused(|c| c.section.filter.radius_cycles_per_px = 0.6, "radius_cycles_per_px is 0.6");
         refused(|c| c.section.score.peak_weight = f64::NAN, "peak_weight is NaN");
+        refused(|c| c.section.score.max_peaks = 0, "max_peaks is 0");
         refused(|c| c.search.max_tilt_deg = 90.0, "max_tilt_deg is 90");
+        refused(|c| c.search.candidates_per_section = 0, "candidates_per_section is 0");
+        refused(|c| c.search.pairs_per_section = 0, "pairs_per_section is 0");
+        refused(|c| c.search.pairs = 0, "pairs is 0: 1 or more");
+        refused(|c| c.search.fits = 0, "fits is 0: 1 or more");
         refused(|c| c.shape.sigma_ratio = 0.0, "sigma_ratio is 0");
     }
 }

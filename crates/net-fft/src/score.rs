@@ -67,6 +67,9 @@ impl ScoreConfig {
                 return Err(Error::Parameter { field, value, expected: "a finite number, 0 or more" });
             }
         }
+        if self.max_peaks == 0 {
+            return Err(Error::Parameter { field: "max_peaks", value: 0.0, expected: "1 or more" });
+        }
         Ok(())
     }
 }

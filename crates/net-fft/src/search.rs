@@ -49,6 +49,17 @@ impl SearchConfig {
     /// # Errors
     /// [`Error::Parameter`] names the field.
     pub fn validate(&self) -> Result<()> {
+        for (field, value) in [
+            ("candidates_per_section", self.candidates_per_section),
+            ("pairs_per_section", self.pairs_per_section),
+            ("pairs", self.pairs),
+            ("fits", self.fits),
+        ] {
+            // A search for nothing finds no net in any picture.
+            if value == 0 {
+                return Err(Error::Parameter { field, value: 0.0, expected: "1 or more" });
+            }
+        }
         for (field, value, most) in
             [("min_angle_deg", self.min_angle_deg, 90.0), ("max_tilt_deg", self.max_tilt_deg, 80.0)]
         {
