@@ -88,6 +88,27 @@ fn a_camera_file_that_makes_no_sense_names_field_and_value() {
 }
 
 #[test]
+fn a_lens_that_is_none_is_an_error_of_its_file() {
+    let scratch = Scratch::new();
+    let log = scratch.image_log(1, 96, 64);
+    let good = std::fs::read_to_string(scratch.path("camera.yaml")).unwrap();
+    let camera = scratch.write("camera.yaml", good.replace("[0, 0, 0, 0, 0]", "[1e6, 0, 0, 0, 0]"));
+    let image = netpose()
+        .arg("image")
+        .arg(log.join("f000.png"))
+        .arg("--camera")
+        .arg(camera)
+        .args(["--cell", "50mm"])
+        .output()
+        .expect("netpose starts");
+    for output in [scratch.run(&[]), image] {
+        assert_status(&output, 1);
+        assert_says(&output, &["camera.yaml", "distortion_coefficients is [1000000.0, 0.0"]);
+    }
+    assert!(!scratch.path("out").exists());
+}
+
+#[test]
 fn single_images_that_cannot_be_read_do_not_hide_the_others() {
     let scratch = Scratch::new();
     let log = scratch.image_log(2, 64, 48);

@@ -27,11 +27,23 @@ const VIEW_BOX_STEPS: u32 = 32;
 /// Widening of these bounds, as a share of the view, for the bulge of a bent border between two such rays.
 const VIEW_BOX_MARGIN: f64 = 0.01;
 
+/// Pixels looked at along each side of the image to tell whether the lens can be one.
+const SEEN_STEPS: u32 = 16;
+
+/// Least share of them that must have a ray. Of the circle of a 250 degree fisheye that fits into a picture of 16:9, the 180
+/// degrees that a ray `(x, y, 1)` can have are 0.23 of the picture: no real camera has less.
+const LEAST_SEEN: f64 = 0.125;
+
+/// A ray of a distorting lens so many times nearer to the axis than the pinhole's is none that a lens has: pincushion stays
+/// below 1.5. Coefficients of another unit have a ray for every pixel, all of them in a needle's eye about the axis.
+const MOST_SPREAD: f64 = 2.0;
+
 impl Camera {
     /// Focal lengths `fx, fy` and principal point `cx, cy` in pixels, image size in pixels.
     ///
     /// # Errors
-    /// [`Error::Value`] names the field that is not finite, or not above zero where it must be.
+    /// [`Error::Value`] names the field that is not finite, or not above zero where it must be; [`Error::NearlyBlind`] is for a
+    /// lens by which fewer than one in eight pixels of the image have a ray.
     pub fn new(fx: f64, fy: f64, cx: f64, cy: f64, width: u32, height: u32, lens: Lens) -> Result<Self> {
         positive("fx", fx)?;
         positive("fy", fy)?;
@@ -44,6 +56,18 @@ impl Camera {
         }
         let camera =
             Self { fx, fy, cx, cy, width, height, lens, valid_radius: lens.valid_radius(), view_box: [0.0; 4] };
+        let seen = camera.seen();
+        if seen < LEAST_SEEN {
+            let percent = 100.0 * seen;
+            let expected = format!(
+                "a lens that, with this focal length, gives the picture's pixels rays; {percent:.0} % of them have one that makes sense"
+            );
+            return Err(Error::NearlyBlind {
+                model: lens.model(),
+                coefficients: lens.coefficients().to_vec(),
+                expected,
+            });
+        }
         Ok(camera.with_view_box())
     }
 
@@ -118,6 +142,22 @@ impl Camera {
     /// Bounds of `x` and of `y`, least and greatest, of all rays `(x, y, 1)` that the image sees.
     pub fn view_box(&self) -> [f64; 4] {
         self.view_box
+    }
+
+    /// Share of the image's pixels that have a ray which a lens can have.
+    fn seen(&self) -> f64 {
+        if matches!(self.lens, Lens::None) {
+            return 1.0;
+        }
+        let at = |k: u32, size: u32| (f64::from(k) + 0.5) / f64::from(SEEN_STEPS) * f64::from(size) - 0.5;
+        let pixels = (0..SEEN_STEPS).flat_map(|row| {
+            (0..SEEN_STEPS).map(move |column| Vector2::new(at(column, self.width), at(row, self.height)))
+        });
+        let seen = pixels.filter(|&pixel| {
+            let pinhole = self.plane_from_pixel(pixel).norm();
+            self.ray_from_pixel(pixel).is_some_and(|ray| pinhole <= MOST_SPREAD * ray.xy().norm())
+        });
+        seen.count() as f64 / f64::from(SEEN_STEPS * SEEN_STEPS)
     }
 
     /// Works out `view_box` from rays along the border.

@@ -29,6 +29,16 @@ pub enum Error {
         /// What is wrong, or what would have been accepted.
         expected: &'static str,
     },
+    /// A lens that takes next to nothing of the scene into the picture: a calibration of another camera, or none.
+    #[error("distortion coefficients are {coefficients:?} of {model}: expected {expected}")]
+    NearlyBlind {
+        /// The lens model, as in ROS.
+        model: &'static str,
+        /// Its coefficients, OpenCV's order.
+        coefficients: Vec<f64>,
+        /// What would have been accepted, and how far it is from that.
+        expected: String,
+    },
     /// The camera was calibrated for another image size than the one at hand.
     #[error(
         "the camera is calibrated for {camera_width}x{camera_height} px, the image is {image_width}x{image_height} px"

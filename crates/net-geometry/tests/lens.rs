@@ -231,6 +231,41 @@ fn intrinsics_are_checked_by_name() {
     assert!(sizes.contains("848x480") && sizes.contains("640x480"), "{sizes}");
 }
 
+/// Coefficients that make no lens at this focal length are an error; lenses that end inside the picture, as wide ones do, are not.
+#[test]
+fn a_lens_that_takes_nothing_into_the_picture_is_refused() {
+    let new = |focal: f64, width: u32, lens| {
+        let (w, h) = (f64::from(width), 480.0);
+        Camera::new(focal, focal, w / 2.0, h / 2.0, width, 480, lens)
+    };
+    for lens in [
+        Lens::PlumbBob([1e6, 0.0, 0.0, 0.0, 0.0]),
+        Lens::PlumbBob([-5.0, 0.0, 0.0, 0.0, 0.0]),
+        Lens::PlumbBob([0.0, 0.0, 30.0, 0.0, 0.0]),
+        Lens::Rational([0.0, 0.0, 0.0, 0.0, 0.0, 1e6, 0.0, 0.0]),
+        Lens::KannalaBrandt([-8.0, 0.0, 0.0, 0.0]),
+    ] {
+        let refused = new(600.0, 848, lens).unwrap_err();
+        assert!(matches!(refused, Error::NearlyBlind { .. }), "{lens:?}: {refused}");
+        assert!(refused.to_string().contains(&format!("{:?} of {}", lens.coefficients(), lens.model())), "{refused}");
+    }
+    for (focal, width, lens) in [
+        // Ideal fisheyes of 190 and 250 degrees whose circles fit into the picture's height; half as much of a picture twice as wide.
+        (240.0 / 95f64.to_radians(), 848, Lens::KannalaBrandt([0.0; 4])),
+        (240.0 / 125f64.to_radians(), 848, Lens::KannalaBrandt([0.0; 4])),
+        (240.0 / 95f64.to_radians(), 1696, Lens::KannalaBrandt([0.0; 4])),
+        // The polynomial of a wide lens turns back before the corners.
+        (420.0, 848, Lens::PlumbBob([-0.45, 0.0, 0.0, 0.0, 0.0])),
+        // As strong as this looks, at a long focal length it is 5 % at the corner.
+        (4000.0, 848, Lens::PlumbBob([-4.0, 0.0, 0.0, 0.0, 0.0])),
+        // The strong pincushion of a flat port.
+        (600.0, 848, Lens::PlumbBob([0.5, 0.3, 0.0, 0.0, 0.0])),
+    ] {
+        let camera = new(focal, width, lens);
+        assert!(camera.is_ok(), "{lens:?} at {focal} px: {camera:?}");
+    }
+}
+
 #[test]
 fn models_by_name() {
     assert_eq!(Lens::from_model("plumb_bob", &[]).unwrap(), Lens::None);

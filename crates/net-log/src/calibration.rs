@@ -88,6 +88,9 @@ impl Calibration<'_> {
         }
         Camera::new(fx, fy, cx, cy, self.width, self.height, lens).map_err(|e| match e {
             net_geometry::Error::Value { field, value, expected } => wrong(self.place, field, value, expected),
+            net_geometry::Error::NearlyBlind { expected, .. } => {
+                wrong(self.place, self.fields[1], format!("{:?}", self.coefficients), &expected)
+            }
             other => wrong(self.place, "camera", "refused", &other.to_string()),
         })
     }

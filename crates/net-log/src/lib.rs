@@ -28,7 +28,7 @@
 //! | their times | the message's header; the time of logging where the header's is zero | beyond 2262: that frame |
 //! | order of times | every kind of log | a time that does not come after that of the frame before: that frame; where one frame is ahead of all around it, it is that one |
 //! | pictures | JPEG, PNG, TIFF, BMP, WebP, told by their bytes; 8 and 16 bits, grey, colour, alpha; raw pixels with any row step | cut off, or a size that is beyond the limit, before memory is asked for: that frame |
-//! | cameras | ROS `camera_info` and Kalibr YAML ([`read_camera`]); `CameraInfo` and `CameraCalibration` in the log ([`LogInfo::camera`]), with binning, window and rectified images | unknown model, wrong number of coefficients, NaN, skew, zero focal length, never calibrated, several cameras: [`Error::Calibration`] names file or topic, field and value |
+//! | cameras | ROS `camera_info` and Kalibr YAML ([`read_camera`]); `CameraInfo` and `CameraCalibration` in the log ([`LogInfo::camera`]), with binning, window and rectified images | unknown model, wrong number of coefficients, NaN, skew, zero focal length, a lens that takes nothing into the picture, never calibrated, several cameras: [`Error::Calibration`] names file or topic, field and value |
 //! | results | `poses.csv`, `junctions.parquet`, `run.json` ([`read_poses`], [`read_junctions`], [`RunSummary::read`]) | a row that does not parse: [`Error::Table`] with its line. A last line that was never finished is left out |
 //!
 //! # Writing results

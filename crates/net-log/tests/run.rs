@@ -268,7 +268,7 @@ fn logs_that_are_written_read_back() {
     let mut log = open(&file, &OpenOptions::default()).unwrap();
     assert_eq!(log.info().topic.as_deref(), Some("/camera/image_raw/compressed"));
     assert_eq!(log.next().unwrap().decode().unwrap(), pictures[3]);
-    for lens in [Lens::None, Lens::PlumbBob([0.1, 0.0, -1e-9, 3.0, 7.0]), Lens::KannalaBrandt([0.1, 0.2, 0.3, 0.4])] {
+    for lens in [Lens::None, Lens::PlumbBob([0.1, 0.0, -1e-9, 0.03, 7.0]), Lens::KannalaBrandt([0.1, 0.2, 0.3, 0.4])] {
         let path = dir.path().join("camera.yaml");
         write_camera_yaml(&path, &camera(lens)).unwrap();
         // A pinhole is written as a lens that bends nothing.

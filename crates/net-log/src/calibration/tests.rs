@@ -68,14 +68,14 @@ fn ros_lens_models() {
         parse(&ROS.replace("plumb_bob", model).replace("[-0.25, 0.0625, 1e-3, -2.0e-4, 0.5]", data)).map(|c| *c.lens())
     };
     let lens = |model, data| with(model, data).expect("valid");
-    assert_eq!(lens("plumb_bob", "[1, 2, 3, 4]"), Lens::PlumbBob([1.0, 2.0, 3.0, 4.0, 0.0]));
-    assert_eq!(lens("plumb_bob", "[1, 2, 3, 4, 5, 0, 0, 0]"), Lens::PlumbBob([1.0, 2.0, 3.0, 4.0, 5.0]));
+    assert_eq!(lens("plumb_bob", "[1, 2, 0.3, 0.4]"), Lens::PlumbBob([1.0, 2.0, 0.3, 0.4, 0.0]));
+    assert_eq!(lens("plumb_bob", "[1, 2, 0.3, 0.4, 5, 0, 0, 0]"), Lens::PlumbBob([1.0, 2.0, 0.3, 0.4, 5.0]));
     assert_eq!(lens("plumb_bob", "[]"), Lens::None);
     assert_eq!(lens("equidistant", "[1, 2, 3, 4]"), Lens::KannalaBrandt([1.0, 2.0, 3.0, 4.0]));
     assert_eq!(lens("fisheye", "[1, 2, 3, 4]"), Lens::KannalaBrandt([1.0, 2.0, 3.0, 4.0]));
-    let eight = Lens::Rational([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
-    assert_eq!(lens("rational_polynomial", "[1, 2, 3, 4, 5, 6, 7, 8]"), eight);
-    assert_eq!(lens("rational_polynomial", "[1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0]"), eight);
+    let eight = Lens::Rational([1.0, 2.0, 0.03, 0.04, 5.0, 0.6, 0.7, 0.8]);
+    assert_eq!(lens("rational_polynomial", "[1, 2, 0.03, 0.04, 5, 0.6, 0.7, 0.8]"), eight);
+    assert_eq!(lens("rational_polynomial", "[1, 2, 0.03, 0.04, 5, 0.6, 0.7, 0.8, 0, 0, 0, 0, 0, 0]"), eight);
     assert_eq!(lens("none", "[0, 0, 0, 0]"), Lens::None);
     for (model, data) in [
         ("plumb_bob", "[1, 2, 3]"),
@@ -109,6 +109,17 @@ fn bad_intrinsics_name_field_and_value() {
     assert!(refusal(&ROS.replace("848", "wide")).contains("YAML is unreadable: "));
     assert!(refusal("").contains("camera_matrix is missing") || refusal("").contains("YAML is unreadable"));
     assert!(refusal("[1, 2").contains("YAML is unreadable: "));
+}
+
+/// Numbers of another unit, or of another camera.
+#[test]
+fn a_lens_that_takes_nothing_into_the_picture_names_field_and_value() {
+    let text = refusal(&ROS.replace("[-0.25, 0.0625, 1e-3, -2.0e-4, 0.5]", "[1e6, 0, 0, 0, 0]"));
+    assert!(text.contains("distortion_coefficients is [1000000.0, 0.0, 0.0, 0.0, 0.0]: expected a lens"), "{text}");
+    assert!(text.contains("0 % of them"), "{text}");
+    let only = KALIBR.split("cam1:").next().expect("text");
+    let text = refusal(&only.replace("[-0.1, 0.02, 0.003, -0.004]", "[-7, 0, 0, 0]"));
+    assert!(text.contains("cam0.distortion_coeffs is [-7.0, 0.0, 0.0, 0.0]: expected a lens"), "{text}");
 }
 
 #[test]
