@@ -12,6 +12,7 @@
 
 mod camera_info;
 mod kalibr;
+mod yaml;
 
 use std::path::{Path, PathBuf};
 

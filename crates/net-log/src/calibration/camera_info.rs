@@ -3,7 +3,7 @@
 use net_geometry::Camera;
 use serde::Deserialize;
 
-use crate::calibration::{Calibration, intrinsics_of, wrong};
+use crate::calibration::{Calibration, intrinsics_of, wrong, yaml};
 use crate::error::Result;
 
 /// The fields that are used; the file's others (name, rectification, projection) are not.
@@ -22,8 +22,7 @@ struct Matrix {
 }
 
 pub(super) fn parse(place: &str, text: &str) -> Result<Camera> {
-    let info: CameraInfo = serde_saphyr::from_str(text)
-        .map_err(|e| wrong(place, "YAML", "unreadable", &format!("a camera_info file: {e}")))?;
+    let info: CameraInfo = yaml::read(place, text, "a camera_info file")?;
     let missing = |field: &str| wrong(place, field, "missing", "the fields of a camera_info or Kalibr camchain file");
     let matrix = info.camera_matrix.ok_or_else(|| missing("camera_matrix"))?;
     let coefficients = info.distortion_coefficients.ok_or_else(|| missing("distortion_coefficients"))?;

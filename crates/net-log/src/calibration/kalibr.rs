@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use net_geometry::Camera;
 use serde::Deserialize;
 
-use crate::calibration::{Calibration, wrong};
+use crate::calibration::{Calibration, wrong, yaml};
 use crate::error::Result;
 
 /// The fields that are used of each camera.
@@ -21,8 +21,7 @@ struct Cam {
 }
 
 pub(super) fn parse(place: &str, text: &str, topic: Option<&str>) -> Result<Camera> {
-    let cams: BTreeMap<String, Cam> = serde_saphyr::from_str(text)
-        .map_err(|e| wrong(place, "YAML", "unreadable", &format!("a Kalibr camchain file: {e}")))?;
+    let cams: BTreeMap<String, Cam> = yaml::read(place, text, "a Kalibr camchain file")?;
     let (name, cam) = choose(place, &cams, topic)?;
     let field = |f: &str| format!("{name}.{f}");
     let missing = |f: &str| wrong(place, &field(f), "missing", "the fields of a Kalibr camchain file");

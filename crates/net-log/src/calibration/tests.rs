@@ -106,9 +106,39 @@ fn bad_intrinsics_name_field_and_value() {
     assert!(refusal(&ROS.replace("0.0, 0.0, 1.0]", "0.0, 1.0]")).contains("camera_matrix is of 8 numbers: "));
     assert!(refusal(&ROS.replace("image_width", "width")).contains("image_width is missing: "));
     assert!(refusal(&ROS.replace("distortion_model", "model")).contains("distortion_model is missing: "));
-    assert!(refusal(&ROS.replace("848", "wide")).contains("YAML is unreadable: "));
     assert!(refusal("").contains("camera_matrix is missing") || refusal("").contains("YAML is unreadable"));
-    assert!(refusal("[1, 2").contains("YAML is unreadable: "));
+}
+
+#[test]
+fn what_is_no_calibration_names_line_and_field() {
+    let only = KALIBR.split("cam1:").next().expect("text");
+    for (text, expected) in [
+        (ROS.replace("848", "wide"), "line 1, field image_width (image_width: wide): expected a whole number"),
+        (
+            ROS.replace("848", "-8"),
+            "line 1, field image_width (image_width: -8): expected a whole number, not below zero",
+        ),
+        (ROS.replace("420.5", "abc"), "line 7, field camera_matrix.data (data: [abc, 0.0, "),
+        (ROS.replace("420.5", "abc"), "1.0]): expected a number"),
+        (ROS.replace("[420.5,", "420.5,"), "line 7, field camera_matrix.data (data: 420.5, 0.0, 423.25"),
+        (ROS.replace("[420.5,", "420.5,"), "expected a list of numbers"),
+        (
+            ROS.replace("camera_matrix:", "camera_matrix: 5\nx:"),
+            "line 4, field camera_matrix (camera_matrix: 5): expected",
+        ),
+        (format!("{ROS}image_width: 5\n"), "field image_width (image_width: 5): expected this field once"),
+        (ROS.replace("  rows: 3\n  cols: 3\n  data: [4", "\tdata: [4"), "line 5 (data: [420.5, "),
+        ("hello".to_owned(), "line 1 (hello): expected fields of a camera_info file"),
+        ("[1, 2".to_owned(), "line 1 ([1, 2): expected"),
+        (
+            only.replace("460.5", "x"),
+            "field cam0.intrinsics (intrinsics: [x, 461.5, 370.25, 230.75]): expected a number",
+        ),
+    ] {
+        let said = refusal(&text);
+        assert!(said.starts_with("front.yaml: YAML is unreadable in line ") && said.contains(expected), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
 }
 
 /// Numbers of another unit, or of another camera.
