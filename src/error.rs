@@ -29,7 +29,7 @@ pub enum Error {
     #[error("prior: {what}")]
     Prior {
         /// What is wrong with it.
-        what: &'static str,
+        what: String,
     },
     /// A time that does not come after the one before.
     #[error("frame time {timestamp_ns} ns does not come after the frame before, {previous_ns} ns")]

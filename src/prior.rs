@@ -1,7 +1,7 @@
 //! What the caller knows of the camera's motion.
 
 use net_geometry::Pose;
-use net_geometry::nalgebra::{Matrix6, Rotation3, SMatrix, Vector2, Vector3};
+use net_geometry::nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, Vector2, Vector3};
 
 use crate::error::{Error, Result};
 
@@ -20,6 +20,11 @@ pub struct MotionPrior {
 /// Largest element that a rotation times its transpose may be off the identity.
 const NOT_A_ROTATION: f64 = 1e-6;
 
+/// Row and column of the first value that is not finite, from 0.
+fn not_finite<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> Option<(usize, usize)> {
+    (0..R).flat_map(|row| (0..C).map(move |column| (row, column))).find(|&at| !m[at].is_finite())
+}
+
 impl MotionPrior {
     /// Rest, for certain.
     pub(crate) fn rest() -> Self {
@@ -27,18 +32,24 @@ impl MotionPrior {
         Self { now_from_before, covariance: Matrix6::zeros() }
     }
 
-    /// Refuses what is no motion.
+    /// Refuses what is no motion, and names the value.
     pub(crate) fn validate(&self) -> Result<()> {
-        let (r, c) = (self.now_from_before.rotation.matrix(), &self.covariance);
-        let turned = (r * r.transpose() - net_geometry::nalgebra::Matrix3::identity()).amax();
-        let what = if !(self.now_from_before.translation.iter().all(|x| x.is_finite()) && turned.is_finite()) {
-            "a number of the motion is not finite"
+        let (r, t, c) = (self.now_from_before.rotation.matrix(), &self.now_from_before.translation, &self.covariance);
+        let turned = (r * r.transpose() - Matrix3::identity()).amax();
+        let [bad_turn, bad_shift, bad_variance] = [not_finite(r), not_finite(t), not_finite(c)];
+        let negative = (0..6).find(|&k| c[(k, k)] < 0.0);
+        let what = if let Some((row, column)) = bad_turn {
+            format!("rotation, row {row}, column {column} is {}: expected a finite number", r[(row, column)])
+        } else if let Some((row, _)) = bad_shift {
+            format!("translation, {} is {}: expected a finite number of metres", ["x", "y", "z"][row], t[row])
         } else if turned > NOT_A_ROTATION || r.determinant() < 0.0 {
-            "the rotation is none"
-        } else if !c.iter().all(|x| x.is_finite()) {
-            "a number of the covariance is not finite"
-        } else if (c - c.transpose()).amax() > 1e-6 * c.amax() || c.diagonal().min() < 0.0 {
-            "the covariance is not symmetric, or has a negative variance"
+            "the rotation is none: its matrix times its transpose is not the identity, or it mirrors".to_owned()
+        } else if let Some((row, column)) = bad_variance {
+            format!("covariance, row {row}, column {column} is {}: expected a finite number", c[(row, column)])
+        } else if let Some(k) = negative {
+            format!("covariance, row {k}, column {k} is {}: expected a variance, 0 or more", c[(k, k)])
+        } else if (c - c.transpose()).amax() > 1e-6 * c.amax() {
+            "the covariance is not symmetric".to_owned()
         } else {
             return Ok(());
         };
@@ -148,20 +159,26 @@ mod tests {
     fn what_is_no_motion_is_refused() {
         let rest = MotionPrior::rest();
         assert!(rest.validate().is_ok());
-        let broken = [
-            MotionPrior { now_from_before: motion(Vector3::zeros(), Vector3::new(f64::NAN, 0.0, 0.0)), ..rest },
-            MotionPrior {
-                now_from_before: Pose {
-                    rotation: Rotation3::from_matrix_unchecked(net_geometry::nalgebra::Matrix3::identity() * 2.0),
-                    translation: Vector3::zeros(),
-                },
-                ..rest
-            },
-            MotionPrior { covariance: Matrix6::identity() * -1.0, ..rest },
-            MotionPrior { covariance: Matrix6::identity() * f64::INFINITY, ..rest },
-        ];
-        for prior in broken {
-            assert!(matches!(prior.validate(), Err(Error::Prior { .. })), "{prior:?}");
+        let matrix =
+            |m: Matrix3<f64>| Pose { rotation: Rotation3::from_matrix_unchecked(m), translation: Vector3::zeros() };
+        let mut torn = Matrix3::identity();
+        torn[(1, 2)] = f64::NAN;
+        let mut skew = Matrix6::identity();
+        skew[(0, 4)] = 0.5;
+        let mut endless = Matrix6::identity();
+        endless[(2, 3)] = f64::INFINITY;
+        let moved = motion(Vector3::zeros(), Vector3::new(0.0, f64::NAN, 0.0));
+        for (prior, words) in [
+            (MotionPrior { now_from_before: moved, ..rest }, "translation, y is NaN: expected a finite number"),
+            (MotionPrior { now_from_before: matrix(torn), ..rest }, "rotation, row 1, column 2 is NaN"),
+            (MotionPrior { now_from_before: matrix(Matrix3::identity() * 2.0), ..rest }, "the rotation is none"),
+            (MotionPrior { covariance: Matrix6::identity() * -1.0, ..rest }, "covariance, row 0, column 0 is -1"),
+            (MotionPrior { covariance: endless, ..rest }, "covariance, row 2, column 3 is inf"),
+            (MotionPrior { covariance: skew, ..rest }, "the covariance is not symmetric"),
+        ] {
+            let refused = prior.validate().unwrap_err();
+            assert!(matches!(refused, Error::Prior { .. }), "{prior:?}");
+            assert!(refused.to_string().starts_with(&format!("prior: {words}")), "{refused}");
         }
     }
 }

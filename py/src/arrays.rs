@@ -4,6 +4,7 @@ use net_geometry::Pose;
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 use net_image::convert::grey_from_colour;
 use net_image::{ColourLayout, GrayView, Image};
+use numpy::ndarray::ArrayView2;
 use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
@@ -92,16 +93,21 @@ pub fn float_array<'py>(name: &str, shape: &str, object: &Bound<'py, PyAny>) -> 
     object.extract().map_err(|_| wrong_type(name, &format!("float64 of shape {shape}"), object))
 }
 
+/// Refuses another shape, and names the first number that is not finite.
+pub fn check_finite(name: &str, m: &ArrayView2<'_, f64>, shape: (usize, usize)) -> PyResult<()> {
+    if m.dim() != shape {
+        return Err(PyValueError::new_err(format!("{name}: expected shape {shape:?}, got {:?}", m.dim())));
+    }
+    let Some(((row, column), value)) = m.indexed_iter().find(|(_, x)| !x.is_finite()) else { return Ok(()) };
+    let value = if value.is_nan() { "nan".to_owned() } else { value.to_string() };
+    Err(PyValueError::new_err(format!("{name}: row {row}, column {column} is {value}: expected a finite number")))
+}
+
 /// A (4, 4) pose as argument `name`.
 pub fn pose_argument(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Pose> {
     let array = float_array(name, "(4, 4)", object)?;
     let m = array.as_array();
-    if m.dim() != (4, 4) || m.iter().any(|x| !x.is_finite()) {
-        return Err(PyValueError::new_err(format!(
-            "{name}: expected finite numbers of shape (4, 4), got {:?}",
-            m.shape()
-        )));
-    }
+    check_finite(name, &m, (4, 4))?;
     let rotation = Matrix3::from_fn(|r, c| m[(r, c)]);
     if (rotation * rotation.transpose() - Matrix3::identity()).amax() > 1e-6 || rotation.determinant() < 0.0 {
         return Err(PyValueError::new_err(format!("{name}: its upper left 3 x 3 is not a rotation")));

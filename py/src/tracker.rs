@@ -2,10 +2,9 @@
 
 use net_geometry::nalgebra::Matrix6;
 use netpose::MotionPrior;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{GrayArgument, float_array, pose_argument};
+use crate::arrays::{GrayArgument, check_finite, float_array, pose_argument};
 use crate::camera::{Camera, Mesh, of_argument, value_error};
 use crate::estimate::Estimate;
 
@@ -43,9 +42,7 @@ impl Tracker {
         let view = image.view()?;
         let array = float_array("covariance", "(6, 6)", covariance)?;
         let c = array.as_array();
-        if c.dim() != (6, 6) {
-            return Err(PyValueError::new_err(format!("covariance: expected shape (6, 6), got {:?}", c.shape())));
-        }
+        check_finite("covariance", &c, (6, 6))?;
         let prior = MotionPrior {
             now_from_before: pose_argument("motion", motion)?,
             covariance: Matrix6::from_fn(|r, k| c[(r, k)]),

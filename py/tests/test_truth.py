@@ -134,6 +134,12 @@ def test_a_prior_carries_the_count_over_steps_of_most_of_a_cell() -> None:
 def test_what_is_no_prior_is_refused(plain: npr.sim.SimFrame) -> None:
     tracker = npr.Tracker(plain.camera, plain.mesh)
     motion, covariance = np.eye(4), np.eye(6)
+    lost, blind = motion.copy(), covariance.copy()
+    lost[1, 3], blind[2, 4] = np.nan, np.inf
+    with pytest.raises(ValueError, match="motion: row 1, column 3 is nan"):
+        tracker.update_with_prior(plain.image, 0, lost, covariance)
+    with pytest.raises(ValueError, match="covariance: row 2, column 4 is inf"):
+        tracker.update_with_prior(plain.image, 0, motion, blind)
     with pytest.raises(ValueError, match="motion"):
         tracker.update_with_prior(plain.image, 0, 2 * motion, covariance)
     with pytest.raises(ValueError, match="covariance"):
