@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use net_geometry::Lens;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
 
 /// Errors of a value keep their words.
 pub fn value_error(error: impl std::fmt::Display) -> PyErr {
@@ -17,8 +18,8 @@ pub fn of_argument(name: &str, error: impl std::fmt::Display) -> PyErr {
 }
 
 /// A calibrated camera.
-#[pyclass(frozen, module = "netpose_rs")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, eq, module = "netpose_rs")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// The camera itself.
     pub inner: net_geometry::Camera,
@@ -84,18 +85,35 @@ impl Camera {
         self.inner.height()
     }
 
+    /// What makes the same camera of its class: for `pickle` and `copy`.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyType>, CameraNumbers) {
+        (py.get_type::<Self>(), self.numbers())
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        let (fx, fy, cx, cy, width, height, distortion, model) = self.numbers();
+        let distortion = PyTuple::new(py, distortion)?;
+        (fx, fy, cx, cy, width, height, distortion, model).into_pyobject(py)?.hash()
+    }
+
+    /// As it would be made again.
     fn __repr__(&self) -> String {
+        let (fx, fy, cx, cy, width, height, distortion, model) = self.numbers();
+        let pinhole = format!("Camera(fx={fx:?}, fy={fy:?}, cx={cx:?}, cy={cy:?}, width={width}, height={height}");
+        match self.inner.lens() {
+            Lens::None => pinhole + ")",
+            _ => format!("{pinhole}, distortion={distortion:?}, model={model:?})"),
+        }
+    }
+}
+
+/// The arguments of the constructor.
+type CameraNumbers = (f64, f64, f64, f64, u32, u32, Vec<f64>, &'static str);
+
+impl Camera {
+    fn numbers(&self) -> CameraNumbers {
         let c = &self.inner;
-        format!(
-            "Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={}, lens={:?})",
-            c.fx(),
-            c.fy(),
-            c.cx(),
-            c.cy(),
-            c.width(),
-            c.height(),
-            c.lens()
-        )
+        (c.fx(), c.fy(), c.cx(), c.cy(), c.width(), c.height(), self.distortion(), self.model())
     }
 }
 
@@ -123,8 +141,8 @@ fn lens(model: Option<&str>, k: &[f64]) -> PyResult<Lens> {
 }
 
 /// The mesh of a net.
-#[pyclass(frozen, module = "netpose_rs")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, eq, module = "netpose_rs")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// The mesh itself.
     pub inner: net_geometry::Mesh,
@@ -156,8 +174,25 @@ impl Mesh {
     fn angle(&self) -> f64 {
         self.inner.angle()
     }
+    /// What makes the same mesh: for `pickle` and `copy`.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (f64, f64, f64))> {
+        Ok((py.get_type::<Self>().getattr("oblique")?, self.numbers()))
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        self.numbers().into_pyobject(py)?.hash()
+    }
+
+    /// As it would be made again.
     fn __repr__(&self) -> String {
-        let m = &self.inner;
-        format!("Mesh.oblique({}, {}, {})", m.side1(), m.side2(), m.angle())
+        let (a, b, angle) = self.numbers();
+        format!("Mesh.oblique({a:?}, {b:?}, {angle:?})")
+    }
+}
+
+impl Mesh {
+    /// Sides, m, and angle, rad.
+    fn numbers(&self) -> (f64, f64, f64) {
+        (self.inner.side1(), self.inner.side2(), self.inner.angle())
     }
 }

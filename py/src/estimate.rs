@@ -4,6 +4,10 @@ use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::array2;
+use crate::pickle::{
+    JunctionNumbers, LayerNumbers, from_junction, from_layer, from_net, to_connection, to_junction, to_layer, to_net,
+    to_status,
+};
 
 /// What one frame says.
 #[pyclass(frozen, module = "netpose_rs")]
@@ -29,6 +33,13 @@ pub struct Layer {
 
 #[pymethods]
 impl Layer {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (LayerNumbers,))> {
+        Ok((py.get_type::<Self>().getattr("_from_state")?, (from_layer(&self.inner),)))
+    }
+    #[staticmethod]
+    fn _from_state(state: LayerNumbers) -> PyResult<Self> {
+        Ok(Self { inner: to_layer(&state)? })
+    }
     #[getter]
     fn probability(&self) -> f64 {
         self.inner.probability
@@ -64,6 +75,9 @@ impl Layer {
     }
 }
 
+/// What [`Estimate`] holds, in the order of its fields.
+type EstimateState = (String, f64, u32, String, Option<Vec<f64>>, Vec<JunctionNumbers>, Vec<LayerNumbers>);
+
 impl Estimate {
     /// Copies what must outlive the frame.
     pub fn from_frame(estimate: &netpose::Estimate<'_>) -> Self {
@@ -81,6 +95,31 @@ impl Estimate {
 
 #[pymethods]
 impl Estimate {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (EstimateState,))> {
+        let state = (
+            self.status.to_owned(),
+            self.probability,
+            self.track,
+            self.connection.to_owned(),
+            self.net.as_ref().map(from_net),
+            self.junctions.iter().map(from_junction).collect(),
+            self.layers.iter().map(from_layer).collect(),
+        );
+        Ok((py.get_type::<Self>().getattr("_from_state")?, (state,)))
+    }
+    #[staticmethod]
+    fn _from_state(state: EstimateState) -> PyResult<Self> {
+        let (status, probability, track, connection, net, junctions, layers) = state;
+        Ok(Self {
+            status: to_status(&status)?,
+            probability,
+            track,
+            connection: to_connection(&connection)?,
+            net: net.as_deref().map(to_net).transpose()?,
+            junctions: junctions.into_iter().map(to_junction).collect::<PyResult<_>>()?,
+            layers: layers.iter().map(to_layer).collect::<PyResult<_>>()?,
+        })
+    }
     #[getter]
     fn range_m(&self) -> Option<f64> {
         self.net.map(|n| n.range_m)

@@ -3,6 +3,7 @@
 mod arrays;
 mod camera;
 mod estimate;
+mod pickle;
 mod stages;
 mod tracker;
 

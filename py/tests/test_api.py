@@ -1,5 +1,7 @@
 """Estimates: images as they come, errors that name the argument."""
 
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -167,3 +169,22 @@ def test_colour_is_weighed_as_everywhere(plain: npr.sim.SimFrame) -> None:
         off = npr.fft.spectrum(colour, window=False, blur=False).astype(int) - npr.fft.spectrum(grey, window=False, blur=False)
         # The spectra of two ramps that differ by at most one level here and there.
         assert np.abs(off).mean() < 8
+
+
+def fields(value: Any) -> dict[str, Any]:
+    return {name: getattr(value, name) for name in dir(value) if not name.startswith("_")}
+
+
+def test_results_can_be_sent_to_another_process(plain: npr.sim.SimFrame) -> None:
+    found = npr.estimate(plain.image, plain.camera, plain.mesh, layers=True)
+    none = npr.estimate(np.zeros_like(plain.image), plain.camera, plain.mesh)
+    assert found.status == "ok" and len(found.layers) == 1 and none.status == "no_net"
+    flat = npr.estimate(plain.image, plain.camera, plain.mesh, method="thesis")
+    for value in (found, none, flat, found.layers[0]):
+        for again in (pickle.loads(pickle.dumps(value)), pickle.loads(pickle.dumps(value, 0)), copy.deepcopy(value)):
+            assert type(again) is type(value) and repr(again) == repr(value)
+            for name, expected in fields(value).items():
+                if name == "layers":
+                    assert [repr(layer) for layer in again.layers] == [repr(layer) for layer in expected]
+                else:
+                    np.testing.assert_array_equal(getattr(again, name), expected, err_msg=name)

@@ -1,5 +1,7 @@
 """Camera and Mesh: what goes in comes out, and what is wrong is named."""
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -138,3 +140,34 @@ def test_bad_meshes() -> None:
             npr.Mesh.rectangular(0.05, bad)
     with pytest.raises(ValueError, match="angle"):
         npr.Mesh.oblique(0.05, 0.05, float("nan"))
+
+
+CAMERAS = [
+    npr.Camera(*CAMERA),
+    npr.Camera(600.1, 1 / 3, -1e-7, 1e5, 1, 1),
+    npr.Camera(*CAMERA, distortion=[-0.2, 0.05, 0.001, -0.002, 0.01]),
+    npr.Camera(*CAMERA, distortion=[0.3, 0.1, 0.0, 0.0, 0.01, 0.6, 0.2, 0.02]),
+    npr.Camera(*CAMERA, distortion=[0.0, 0.0, 0.0, 0.0], model="equidistant"),
+]
+MESHES = [npr.Mesh.square(0.05), npr.Mesh.rectangular(0.1, 1 / 30), npr.Mesh.oblique(0.05, 0.04, 1.2)]
+
+
+@pytest.mark.parametrize("value", CAMERAS + MESHES, ids=repr)
+def test_cameras_and_meshes_are_values(value: npr.Camera | npr.Mesh) -> None:
+    again = [copy.copy(value), copy.deepcopy(value)]
+    again += [pickle.loads(pickle.dumps(value, protocol)) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)]
+    again.append(eval(repr(value), {"Camera": npr.Camera, "Mesh": npr.Mesh}))
+    for other in again:
+        assert other == value and hash(other) == hash(value) and repr(other) == repr(value)
+    others = [other for other in CAMERAS + MESHES if other is not value]
+    assert all(other != value for other in others) and len(set(CAMERAS + MESHES)) == len(CAMERAS + MESHES)
+    assert value != "camera" and value is not None
+
+
+def test_a_lens_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"distortion coefficients are \[1000000\.0, .*plumb_bob"):
+        npr.Camera(*CAMERA, distortion=[1e6, 0.0, 0.0, 0.0])
+    file = tmp_path / "bad.yaml"
+    file.write_text(YAML.replace("[-0.2,", "[1e6,"))
+    with pytest.raises(ValueError, match=r"bad\.yaml: distortion_coefficients is \[1000000\.0, "):
+        npr.Camera.from_yaml(file)

@@ -42,7 +42,9 @@ class Camera:
 
     fx, fy, cx, cy: pixels. width, height: pixels. distortion: OpenCV's order; 4 or 5 values are ``plumb_bob``, 8 are
     ``rational_polynomial``; 4 with ``model="equidistant"`` are a fisheye (Kannala-Brandt).
-    Raises ValueError that names the value which is not finite or out of range.
+    Raises ValueError that names the value which is not finite or out of range, or a lens by which next to nothing of the picture has a ray.
+
+    A value: ``==`` and ``hash`` go by the numbers, ``repr`` can be evaluated, ``pickle`` and ``copy`` make an equal one.
     """
 
     def __new__(
@@ -80,7 +82,7 @@ class Camera:
 
 @final
 class Mesh:
-    """Two lattice vectors in the net plane. A side is knot to knot, metres; not the stretched mesh."""
+    """Two lattice vectors in the net plane. A side is knot to knot, metres; not the stretched mesh. A value, as ``Camera`` is."""
 
     @staticmethod
     def square(cell: float) -> Mesh: ...
@@ -99,7 +101,8 @@ class Mesh:
 
 @final
 class Estimate:
-    """What one frame says. Pose and what follows from it are None unless ``status`` is ``"ok"``."""
+    """What one frame says. Pose and what follows from it are None unless ``status`` is ``"ok"``. Can be pickled, between equal versions
+    of this package."""
 
     @property
     def status(self) -> Literal["ok", "no_net"]: ...
@@ -158,7 +161,7 @@ class Estimate:
 @final
 class Layer:
     """One of several nets in a picture. The origin of one that is not followed is the node nearest to the optical axis, in each
-    picture anew."""
+    picture anew. Can be pickled, between equal versions of this package."""
 
     @property
     def probability(self) -> float:
