@@ -112,15 +112,6 @@ impl Canvas {
         }
     }
 
-    /// Darkens or tints a rectangle whose top-left pixel is `(u, v)`.
-    pub fn shade(&mut self, u: usize, v: usize, width: usize, height: usize, colour: Colour, cover: f64) {
-        for y in v..(v + height).min(self.height) {
-            for x in u..(u + width).min(self.width) {
-                self.blend(x as i64, y as i64, colour, cover);
-            }
-        }
-    }
-
     /// The picture as a PNG file.
     pub fn to_png(&self) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -172,7 +163,6 @@ mod tests {
             canvas.line(Vector2::new(-50.0, -60.0), Vector2::new(end, -9.0), 2.0, WHITE, 1.0);
             canvas.ring(Vector2::new(end, 3.0), 2.0, 1.0, WHITE, 1.0);
         }
-        canvas.shade(8, 6, 100, 100, WHITE, 0.0);
         assert!(canvas.rgb.iter().all(|&g| g == 0));
     }
 }

@@ -105,6 +105,25 @@ mod tests {
 
     use super::*;
 
+    /// The status is read against any picture, and hides no more of it than its letters and their edges.
+    #[test]
+    fn the_status_hides_the_picture_behind_its_letters_only() {
+        for grey in [0, 255] {
+            let plain = net_image::Image::from_vec(vec![grey; 848 * 60], 848, 60).unwrap();
+            let mut canvas = Canvas::from_gray(plain.view().unwrap());
+            canvas.status(&["frame 7  ok".to_owned(), "range 1.200 m".to_owned()], GOOD);
+            let count = |wanted: Colour| {
+                let pixels = (0..60).flat_map(|v| (0..848).map(move |u| (u, v)));
+                pixels.filter(|&(u, v)| canvas.pixel(u, v) == wanted).count()
+            };
+            let (letters, untouched) = (count(GOOD), count([grey; 3]));
+            assert!(letters > 300, "{letters}");
+            // 24 characters of 9 x 18 px and their edges; all the rest is the picture.
+            assert!((848 * 60 - 24 * 11 * 20..848 * 60).contains(&untouched), "{untouched}");
+            assert_eq!(canvas.pixel(840, 3), [grey; 3]);
+        }
+    }
+
     /// A missing twine is red, from knot to knot.
     #[test]
     fn twines_have_the_colour_of_their_state() {

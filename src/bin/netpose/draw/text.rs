@@ -35,13 +35,16 @@ fn font(canvas: &Canvas) -> &'static MonoFont<'static> {
 }
 
 impl Canvas {
-    /// Lines of text on a dark band along the top of the picture.
+    /// Lines of text along the top of the picture, each letter with a dark edge: between the letters the picture stays as it is.
     pub fn status(&mut self, lines: &[String], colour: Colour) {
         let font = font(self);
         let line_height = font.character_size.height as usize + 2;
-        self.shade(0, 0, self.width(), line_height * lines.len() + 6, [0; 3], 0.6);
         for (k, line) in lines.iter().enumerate() {
-            self.text(6, (4 + k * line_height) as i32, line, colour);
+            let (u, v) = (6, (4 + k * line_height) as i32);
+            for (du, dv) in (-1..=1).flat_map(|du| (-1..=1).map(move |dv| (du, dv))) {
+                self.text(u + du, v + dv, line, [0; 3]);
+            }
+            self.text(u, v, line, colour);
         }
     }
 
