@@ -147,10 +147,16 @@ impl Workspace {
         }
         let sides = [mesh.side1(), mesh.side2()];
         let mut tools = Tools::default();
+        let tiles = view.levels.iter().flat_map(|level| &level.tiles).map(|grid| grid.sites.len());
+        tools.fitter.bumps.reserve(tiles.max().unwrap_or(0));
         tools.likelihood.set_widths(sides.map(|side| config.twine_diameter_m / side));
         Self {
             scope: Scope { sides, angle: mesh.angle(), angle_sigma: config.crossing_angle_sigma_deg.to_radians() },
-            prior: Prior { sigma: surface::prior(config), angle: mesh.angle() },
+            prior: Prior {
+                sigma: surface::prior(config),
+                angle: mesh.angle(),
+                bumps: [config.height_sigma_m, config.height_length_m],
+            },
             banks,
             spectra: Spectra::new(),
             background: Background::default(),

@@ -6,7 +6,7 @@ use net_lattice::LatticeEstimate;
 pub fn line(e: &LatticeEstimate) -> String {
     let v = &e.evidence;
     format!(
-        " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3} C {:.2} {:.2} cg {:.2} {:.2} above {:.2} scatter {:.3} {:.3} bumps {:.2}",
+        " | {:?} {:?} bend {:.2} sep {:.2} unlike {:.2} bal {:.2} cs {:.1} dis {:.2} hid {:.2} V {:.1} {:.1} V2 {:.1} {:.1} good {:.2} near {:.2} n {} {} margin {:.2} gain {:.4} sr {:.4} st {:.3} C {:.2} {:.2} cg {:.2} {:.2} above {:.2} scatter {:.3} {:.3} bumps {:.2} strain {:.1} {:.1}",
         e.model,
         e.polarity,
         v.bend.to_degrees(),
@@ -36,5 +36,7 @@ pub fn line(e: &LatticeEstimate) -> String {
         v.scatter[0],
         v.scatter[1],
         v.bumps.to_degrees(),
+        v.strain[0],
+        v.strain[1],
     )
 }

@@ -22,6 +22,8 @@ pub(crate) struct Errors {
 /// What makes errors besides the observations' noise.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Doubt {
+    /// Share of the formal covariance that is counted.
+    pub formal: f64,
     /// Residual scale, in units of what the observations claim.
     pub scale: f64,
     /// Distance over which residuals may be alike, px.
@@ -34,7 +36,7 @@ pub(crate) struct Doubt {
 
 /// Share of the formal covariance that is counted in any case: what the residuals of a few tiles show may be next to nothing by chance. Simulated flat nets
 /// have an error squared per degree of freedom of 1.0 to 1.2 without it, and of 0.4 with all of it, since it is in the residuals a second time.
-const FORMAL: f64 = 0.15;
+pub(crate) const FORMAL: f64 = 0.15;
 
 /// Errors of a fit of the first `count` parameters: what residuals that are alike do ([`Fitter::alike`]: a sheet that bends otherwise than the model, and noise), a
 /// part of the formal covariance, and what sides of another ratio would do (considered, not estimated: it cannot be told from tilt and bend reliably).
@@ -60,7 +62,7 @@ pub(crate) fn errors(
     let consider: Params = std::array::from_fn(|a| {
         doubt.side_ratio * formal[a].iter().zip(&pull).take(count).map(|(c, pull)| c * pull).sum::<f64>()
     });
-    let noise = FORMAL * doubt.scale.max(0.3).powi(2);
+    let noise = doubt.formal * doubt.scale.max(0.3).powi(2);
     let mut c = fitter.alike(count, observations, robust, formal, doubt.reach, scratch);
     for a in 0..count {
         for b in 0..count {

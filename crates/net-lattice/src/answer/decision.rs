@@ -43,6 +43,9 @@ pub struct Evidence {
     pub scatter: [f64; 2],
     /// Angle, rad, by which bumps of the sheet too short for its polynomial may turn the normal on the axis; zero of a flat one.
     pub bumps: f64,
+    /// Of a sheet with a relief, how unlikely its bumps, and what its threads stray, are: sums of squared standard deviations of the prior. A sheet that settled a cycle off somewhere
+    /// needs more of both. Zero without a relief.
+    pub strain: [f64; 2],
     /// Share of the average cell's variance that two families of straight twine can make: a sum of functions of one lattice coordinate each.
     pub separable: f64,
     /// Share of the variance of two by two average cells in which the four differ.
@@ -160,6 +163,11 @@ impl Evidence {
         e
     }
 
+    /// Whether the sheet has a relief.
+    fn has_relief(&self) -> bool {
+        self.strain != [0.0; 2]
+    }
+
     /// Adds what all harmonics together say.
     pub(crate) fn with_comb(mut self, all: &Self) -> Self {
         (self.comb, self.comb_good, self.comb_near) = (all.v, all.good, all.good_near);
@@ -181,13 +189,17 @@ impl Evidence {
         Fold { separable: self.separable, balance: self.balance, unlike: self.unlike, snr: self.cell_snr }
     }
 
-    /// Adds the angle between tangent and mean plane of a sheet whose cells have these sides and which is this deep on the axis, m, and what bumps of `length` m
-    /// may do: one that moves twines seen a `length` off the axis by `d` is `d depth / length` high, and its slope is that over the length.
+    /// Adds the angle between tangent and mean plane of a sheet whose cells have these sides and which is this deep on the axis, m, and what bumps of `length` m may do.
     pub(crate) fn bent(mut self, angle: f64, sides: [f64; 2], depth: f64, length: f64) -> Self {
         self.bend = angle;
-        let off = f64::max(self.scatter[0] * sides[0], self.scatter[1] * sides[1]);
-        self.bumps = if angle > FLAT { off * depth / (length * length) } else { 0.0 };
+        self.bumps = if angle > FLAT { self.bumps_of(sides, depth, length) } else { 0.0 };
         self
+    }
+
+    /// Angle, rad, by which bumps of `length` m may turn the normal that scatter the twines so: one that moves twines seen a `length` off the axis by `d` is `d depth / length` high,
+    /// and its slope is that over the length.
+    pub(crate) fn bumps_of(&self, sides: [f64; 2], depth: f64, length: f64) -> f64 {
+        f64::max(self.scatter[0] * sides[0], self.scatter[1] * sides[1]) * depth / (length * length)
     }
 
     /// Probability that there is a net, with range within 5 %, normal and in-plane rotation within 5 degrees.
@@ -198,8 +210,10 @@ impl Evidence {
         // A bend that nearly every tile agrees on is the net's, and may be as large as the answer's tolerance; else it may be the fit's alone.
         let agreed = ((self.comb_good - 0.7) / 0.2).clamp(0.0, 1.0);
         let straight = logistic((3.5 + 1.5 * agreed - self.bend.to_degrees()) / 0.4);
-        // Rayleigh, both axes alike: where sheets are bent, errors of the worst are twice what the covariance says.
-        let sigma = (2.0 * tilt_sigma).max(1e-6);
+        // Rayleigh, both axes alike: where sheets are bent, errors of the worst are twice what the covariance says; less where a relief follows the bends: of 180 one in a hundred is
+        // off by 3.8 deviations, which 1.25 times as large ones are as often.
+        let worst = if self.has_relief() { 1.25 } else { 2.0 };
+        let sigma = (worst * tilt_sigma).max(1e-6);
         let normal = 1.0 - (-0.5 * (5f64.to_radians() / sigma).powi(2)).exp();
         self.lattice_probability() * straight * normal
     }
@@ -245,7 +259,9 @@ impl Evidence {
         let differs = 0.02 + 0.03 * strong + (1.5 - 0.3 * strong) / snr;
         let limit = (0.01 + 0.15 * self.balance).min(differs).min(0.1);
         let alike = logistic((limit - self.unlike) / 0.006);
-        there * steady * borne * uncontradicted * twine * alike
+        // Unlikely bumps and unlikely threads together: of 180 right ones that the rest vouches for one has as much, and so had a sheet that settled a third of a cell off behind a fish.
+        let likely = logistic(35.0 - (self.strain[0] * self.strain[1]).sqrt());
+        there * steady * borne * uncontradicted * twine * alike * likely
     }
 }
 

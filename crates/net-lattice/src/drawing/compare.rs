@@ -101,11 +101,10 @@ impl Workspace {
                 let w = focus.weight(o.site.pixel);
                 o.weight.iter_mut().for_each(|o| *o *= w);
             }
-            let count = model.parameters();
-            let done = if lock.quick {
-                t.fitter.settle(&surface, count, &t.observations, robust, &self.prior)?
+            let done = if lock.quick && model != Model::Bumpy {
+                t.fitter.settle(&surface, model.parameters(), &t.observations, robust, &self.prior)?
             } else {
-                t.fitter.fit(&surface, count, &t.observations, robust, &self.prior, 2)?
+                t.fitter.fit_model(&surface, model, &t.observations, robust, &self.prior, 2)?
             };
             surface = done.surface;
             fit = Some((done, robust));

@@ -24,7 +24,7 @@ pub(crate) struct Measurement {
     /// Magnitudes of the waves, and mean square of the high-passed picture without clipping; arbitrary units.
     pub amplitude: [f64; 2],
     pub power: f64,
-    /// Whether it counts: enough of it shows the sheet, cells there are wider than 3 px, and it is not empty beside the others.
+    /// Whether it counts: enough of it shows the sheet, which is described as far as that, cells there are wider than 3 px, and it is not empty beside the others.
     pub good: bool,
     /// Next to nothing is in it.
     pub empty: bool,
@@ -111,7 +111,8 @@ pub(crate) fn measure(
             }
             let resolved = m.k[0].max(m.k[1]) < 1.0 / (3.0 * view.reduction as f64);
             m.empty = sum.power < limit * sum.count;
-            m.good = sum.count > 0.5 * grid.area && resolved && !m.empty;
+            let described = chart.described(site.ray, p.depth);
+            m.good = sum.count > 0.5 * grid.area && resolved && !m.empty && described;
         }
         out.push(m);
     }

@@ -113,7 +113,7 @@ impl Workspace {
             self.measure_comb(&surface, place, seed.looks, &window);
             self.observe_measured(&window);
             let t = &mut self.tools;
-            surface = t.fitter.fit(&surface, model.parameters(), &t.observations, LOCKED, &self.prior, 2)?.surface;
+            surface = t.fitter.fit_model(&surface, model, &t.observations, LOCKED, &self.prior, 2)?.surface;
         }
         Some(surface)
     }

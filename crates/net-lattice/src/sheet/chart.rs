@@ -1,5 +1,6 @@
 //! Where rays meet the sheet, and the lattice coordinates there.
 
+use crate::sheet::relief::{Relief, Row, Rows};
 use crate::sheet::surface::{PARAMETERS, Params, SHAPE, Surface};
 
 impl Surface {
@@ -18,7 +19,8 @@ impl Surface {
             det: cd * cd - sd * sd,
             height: self.height,
             bending: self.bending,
-            bent: self.height.iter().any(|c| *c != 0.0),
+            relief: self.relief,
+            bent: !self.is_flat(),
             per_side: [1.0 / self.sides[0], 1.0 / self.sides[1]],
             offset: self.offset,
             far: 240.0 * self.sides[0].max(self.sides[1]),
@@ -38,6 +40,7 @@ pub(crate) struct Chart {
     det: f64,
     height: [f64; 12],
     bending: [f64; 2],
+    relief: Option<Relief>,
     bent: bool,
     per_side: [f64; 2],
     offset: [f64; 2],
@@ -54,6 +57,24 @@ pub(crate) struct Point {
 /// Three-point Gauss: places of [0, 1] and their weights.
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// The same with six points, for what bumps draw in.
+const GAUSS_BUMPS: [(f64, f64); 6] = {
+    const HALVES: [(f64, f64); 3] = [
+        (0.238_619_186_083_196_9, 0.467_913_934_572_691),
+        (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
+        (0.932_469_514_203_152, 0.171_324_492_379_170_3),
+    ];
+    let mut points = [(0.0, 0.0); 6];
+    let mut k = 0;
+    while k < 3 {
+        let (place, weight) = HALVES[k];
+        points[k] = (0.5 - 0.5 * place, 0.5 * weight);
+        points[k + 3] = (0.5 + 0.5 * place, 0.5 * weight);
+        k += 1;
+    }
+    points
+};
 
 /// The height polynomial's terms at a point, in the order of [`crate::sheet::surface::TERMS`].
 fn terms(x: f64, y: f64) -> [f64; 12] {
@@ -83,12 +104,33 @@ impl Chart {
             + y2 * (c[5] * x + c[6] * y)
             + x2 * (c[7] * x2 + c[8] * xy + c[9] * y2)
             + y2 * (c[10] * xy + c[11] * y2);
-        let (hx, hy) = self.slope(x, y);
-        (h, hx, hy)
+        let (hx, hy) = self.polynomial_slope(x, y);
+        match &self.relief {
+            None => (h, hx, hy),
+            Some(relief) => {
+                let [r, rx, ry] = relief.at(x, y);
+                (h + r, hx + rx, hy + ry)
+            }
+        }
     }
 
     #[inline]
     fn slope(&self, x: f64, y: f64) -> (f64, f64) {
+        let (hx, hy) = self.polynomial_slope(x, y);
+        self.relief.as_ref().map_or((hx, hy), |relief| {
+            let [_, rx, ry] = relief.at(x, y);
+            (hx + rx, hy + ry)
+        })
+    }
+
+    /// Places along a twine from the axis, parts of the way, at which its slope is looked at, and their weights.
+    #[inline]
+    fn quadrature(&self) -> &'static [(f64, f64)] {
+        if self.relief.is_some() { &GAUSS_BUMPS } else { &GAUSS }
+    }
+
+    #[inline]
+    fn polynomial_slope(&self, x: f64, y: f64) -> (f64, f64) {
         let c = &self.height;
         let (x2, y2, xy) = (x * x, y * y, x * y);
         let hx = c[0] * x
@@ -202,13 +244,18 @@ impl Chart {
         let mut w = [[0.0; PARAMETERS - SHAPE]; 2];
         (w[0][12], w[1][13]) = (0.5 * s2 * s2, 0.5 * s1 * s1);
         if self.bent {
-            for (t, weight) in GAUSS {
+            for &(t, weight) in self.quadrature() {
                 let [first, second] = [(t * s1, s2), (s1, t * s2)];
                 let places = [(first, s1, (cd, sd)), (second, s2, (sd, cd))];
                 for (w, ((p, q), length, (cx, cy))) in w.iter_mut().zip(places) {
-                    let (tx, ty) = terms_slope(cd * p + sd * q, sd * p + cd * q);
+                    let (x, y) = (cd * p + sd * q, sd * p + cd * q);
+                    let (tx, ty) = terms_slope(x, y);
                     let rise: [f64; 12] = std::array::from_fn(|k| cx * tx[k] + cy * ty[k]);
-                    let e: f64 = rise.iter().zip(&self.height).map(|(r, c)| r * c).sum();
+                    let mut e: f64 = rise.iter().zip(&self.height).map(|(r, c)| r * c).sum();
+                    if let Some(relief) = &self.relief {
+                        let [_, rx, ry] = relief.at(x, y);
+                        e += cx * rx + cy * ry;
+                    }
                     w.iter_mut().zip(rise).for_each(|(w, r)| *w -= length * weight * e * r);
                 }
             }
@@ -221,6 +268,54 @@ impl Chart {
         }
     }
 
+    /// Lengths along the two families to a place of the tangent plane, m.
+    pub(crate) fn arcs(&self, x: f64, y: f64) -> [f64; 2] {
+        [(self.cd * x - self.sd * y) / self.det, (self.cd * y - self.sd * x) / self.det]
+    }
+
+    /// Whether what describes bumps, if anything does, reaches as far as where a ray meets the sheet.
+    pub(crate) fn described(&self, ray: [f64; 2], depth: f64) -> bool {
+        let Some(relief) = &self.relief else { return true };
+        let along = |axis: &[f64; 3]| (axis[0] * ray[0] + axis[1] * ray[1] + axis[2]) * depth - axis[2] * self.z;
+        relief.covers(along(&self.e1), along(&self.e2))
+    }
+
+    /// Derivatives of the coordinates of a point that a ray meets by the relief's coefficients, into `rows`, which are zero.
+    pub(crate) fn relief_slopes(&self, ray: [f64; 2], point: &Point, rows: &mut [Row; 2]) {
+        let Some(relief) = &self.relief else { return };
+        let d = [ray[0], ray[1], 1.0];
+        let along = |axis: &[f64; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
+        let (a1, a2, depth, z) = (along(&self.e1), along(&self.e2), point.depth, self.z);
+        let (x, y) = (a1 * depth - self.e1[2] * z, a2 * depth - self.e2[2] * z);
+        let (hx, hy) = self.slope(x, y);
+        let h = 1e-6 * depth;
+        let (right, below) = (self.lattice(x + h, y), self.lattice(x, y + h));
+        let farther = 1.0 / (along(&self.n) - hx * a1 - hy * a2);
+        let by = std::array::from_fn(|f| ((right[f] - point.s[f]) * a1 + (below[f] - point.s[f]) * a2) / h * farther);
+        let mut rows = Rows::new(relief, rows);
+        // Higher, the point is met farther along the ray, ..
+        rows.add_height(x, y, by);
+        // .. and both twines that lead to it, from threads that may stray, are longer.
+        let (cd, sd) = (self.cd, self.sd);
+        let [s1, s2] = self.arcs(x, y);
+        let per = 1.0 / (self.det * self.det);
+        let through = [[1.0, -2.0 * cd * sd], [-2.0 * cd * sd, 1.0]];
+        let by = |twine: usize, by: f64| std::array::from_fn(|f| self.per_side[f] * per * through[f][twine] * by);
+        for (twine, s) in [s2, s1].into_iter().enumerate() {
+            rows.add_aside(twine, s, by(twine, -1.0));
+        }
+        for &(t, weight) in self.quadrature() {
+            let places = [((t * s1, s2), s1, [cd, sd]), ((s1, t * s2), s2, [sd, cd])];
+            for (twine, ((p, q), length, way)) in places.into_iter().enumerate() {
+                let (x, y) = (cd * p + sd * q, sd * p + cd * q);
+                let (hx, hy) = self.slope(x, y);
+                let drawn = length * weight * (way[0] * hx + way[1] * hy);
+                rows.add_slope(x, y, way, by(twine, drawn));
+            }
+        }
+        rows.settle();
+    }
+
     /// Lattice coordinates of the point above `(x, y)` of the tangent plane.
     #[inline]
     pub(crate) fn lattice(&self, x: f64, y: f64) -> [f64; 2] {
@@ -229,9 +324,13 @@ impl Chart {
         let s2 = (cd * y - sd * x) * per_det;
         let mut w1 = 0.5 * self.bending[0] * s2 * s2;
         let mut w2 = 0.5 * self.bending[1] * s1 * s1;
+        if let Some(relief) = &self.relief {
+            w1 += relief.aside(0, s2);
+            w2 += relief.aside(1, s1);
+        }
         if self.bent {
             // Inextensible twine: the sheet is drawn in by half the squared slope along each twine, integrated from the axis (3-point Gauss).
-            for (t, weight) in GAUSS {
+            for &(t, weight) in self.quadrature() {
                 let (p, q) = (t * s1, s2);
                 let (hx, hy) = self.slope(cd * p + sd * q, sd * p + cd * q);
                 let e = cd * hx + sd * hy;

@@ -2,7 +2,9 @@
 
 use crate::numeric::Normal;
 use crate::picture::view::Site;
+use crate::sheet::bumps::Bumps;
 use crate::sheet::chart::Point;
+use crate::sheet::model::Model;
 use crate::sheet::surface::{PARAMETERS, Params, Surface};
 use net_image::widely;
 
@@ -47,6 +49,8 @@ impl Robust {
 pub(crate) struct Prior {
     pub sigma: Params,
     pub angle: f64,
+    /// Standard deviation of bumps, m, and their correlation length, m.
+    pub bumps: [f64; 2],
 }
 
 /// What a fit ends with.
@@ -62,10 +66,11 @@ pub(crate) struct Fit {
 pub(crate) struct Fitter {
     pub jacobian: Vec<[Params; 2]>,
     /// Depth at each site.
-    depth: Vec<f64>,
+    pub(crate) depth: Vec<f64>,
     /// Residuals of the last iteration, before its step; NaN where the sheet is not seen.
     pub residuals: Vec<[f64; 2]>,
     whitened: Vec<f64>,
+    pub bumps: Bumps,
 }
 
 /// Finite-difference steps, in the order of the parameters.
@@ -85,7 +90,9 @@ impl Fitter {
         self.residuals.clear();
         self.depth.clear();
         for o in observations {
-            let seen = chart.at(o.site.ray[0], o.site.ray[1]).filter(|_| o.weight[0] + o.weight[2] > 0.0);
+            let seen = chart
+                .at(o.site.ray[0], o.site.ray[1])
+                .filter(|p| o.weight[0] + o.weight[2] > 0.0 && chart.described(o.site.ray, p.depth));
             self.depth.push(seen.map_or(0.0, |p| p.depth));
             self.residuals.push(seen.map_or([f64::NAN; 2], |p| [o.s[0] - p.s[0], o.s[1] - p.s[1]]));
         }
@@ -123,7 +130,7 @@ impl Fitter {
     }
 
     /// The same with the derivatives in closed form: a third of the time.
-    fn linearize_quickly(&mut self, surface: &Surface, count: usize, observations: &[Observation]) {
+    pub(crate) fn linearize_quickly(&mut self, surface: &Surface, count: usize, observations: &[Observation]) {
         self.compare(surface, observations);
         self.jacobian.clear();
         self.jacobian.resize(observations.len(), [[0.0; PARAMETERS]; 2]);
@@ -195,6 +202,22 @@ impl Fitter {
         pull
     }
 
+    /// Fits what a model leaves free. `None` when the sheet runs away.
+    pub(crate) fn fit_model(
+        &mut self,
+        start: &Surface,
+        model: Model,
+        observations: &[Observation],
+        robust: Robust,
+        prior: &Prior,
+        iterations: usize,
+    ) -> Option<Fit> {
+        match model {
+            Model::Bumpy => self.fit_bumps(start, observations, robust, prior, iterations),
+            _ => self.fit(start, model.parameters(), observations, robust, prior, iterations),
+        }
+    }
+
     /// Fits the first `count` parameters. `None` when the sheet runs away.
     pub(crate) fn fit(
         &mut self,
@@ -241,17 +264,27 @@ impl Fitter {
         prior: &Prior,
     ) -> Option<Fit> {
         let (mut d, covariance) = self.normal(surface, count, observations, robust, prior).solve(count)?;
-        let turn = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-        let limit = |limit: f64, x: f64| limit / (x.abs() + 1e-12);
-        let damp = 1f64.min(limit(0.15, turn)).min(limit(0.15, d[3])).min(limit(0.12, d[6]));
-        d.iter_mut().for_each(|d| *d *= damp);
+        damped(&mut d);
         let surface = surface.stepped(&d);
-        let sound = surface.rotation[(2, 2)] > 0.12
-            && surface.depth > 1.5 * surface.sides[0].min(surface.sides[1])
-            && (0.3..=2.84).contains(&surface.angle)
-            && (surface.angle - prior.angle).abs() < 0.8;
-        sound.then_some(Fit { surface, covariance })
+        sound(&surface, prior).then_some(Fit { surface, covariance })
     }
+}
+
+/// Shortens a step that leads too far; returns the part that is left.
+pub(crate) fn damped(d: &mut Params) -> f64 {
+    let turn = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+    let limit = |limit: f64, x: f64| limit / (x.abs() + 1e-12);
+    let damp = 1f64.min(limit(0.15, turn)).min(limit(0.15, d[3])).min(limit(0.12, d[6]));
+    d.iter_mut().for_each(|d| *d *= damp);
+    damp
+}
+
+/// Whether a sheet is still one that a camera may see.
+pub(crate) fn sound(surface: &Surface, prior: &Prior) -> bool {
+    surface.rotation[(2, 2)] > 0.12
+        && surface.depth > 1.5 * surface.sides[0].min(surface.sides[1])
+        && (0.3..=2.84).contains(&surface.angle)
+        && (surface.angle - prior.angle).abs() < 0.8
 }
 
 widely! {

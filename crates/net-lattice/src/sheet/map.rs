@@ -48,7 +48,7 @@ impl PhaseMap {
         let chart = surface.chart();
         self.nodes_x = level.nodes_x;
         self.s.clear();
-        if surface.height.iter().all(|c| *c == 0.0) || level.nodes_x <= 3 * STRIDE || level.nodes_y <= 3 * STRIDE {
+        if surface.is_flat() || level.nodes_x <= 3 * STRIDE || level.nodes_y <= 3 * STRIDE {
             self.s.extend(level.rays.iter().map(|r| exact(&chart, r).map(|s| s as f32)));
             return;
         }

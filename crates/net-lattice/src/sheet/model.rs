@@ -18,13 +18,15 @@ pub enum Model {
     Quartic,
     /// Quartic, and twines curved within the sheet: 21.
     Bent,
+    /// Quadratic, twines curved within the sheet, and bumps: 12, and the bumps' own.
+    Bumpy,
 }
 
 impl Model {
-    /// All of them, stiffest first.
+    /// Those that are chosen among, stiffest first.
     pub const ALL: [Self; 6] = [Self::Square, Self::Rhomb, Self::Quadratic, Self::Cubic, Self::Quartic, Self::Bent];
 
-    /// Number of parameters.
+    /// Number of parameters, bumps aside.
     pub fn parameters(self) -> usize {
         match self {
             Self::Square => 6,
@@ -32,7 +34,7 @@ impl Model {
             Self::Quadratic => 10,
             Self::Cubic => 14,
             Self::Quartic => 19,
-            Self::Bent => 21,
+            Self::Bent | Self::Bumpy => 21,
         }
     }
 }

@@ -8,6 +8,7 @@
 use net_geometry::nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::config::Config;
+use crate::sheet::relief::Relief;
 
 /// Number of parameters of the fullest model: rotation 3, log depth, offsets 2, crossing angle, height 12, thread bending 2.
 pub(crate) const PARAMETERS: usize = 21;
@@ -33,6 +34,8 @@ pub struct Surface {
     pub(crate) angle: f64,
     /// Height coefficients in the order of [`TERMS`], metres to the matching power.
     pub(crate) height: [f64; 12],
+    /// Bumps above that.
+    pub(crate) relief: Option<Relief>,
     /// Curvature of the twines within the sheet, 1/m.
     pub(crate) bending: [f64; 2],
     /// Side lengths along the two families, m.
@@ -48,7 +51,7 @@ impl Surface {
 
     /// A flat sheet whose nodes are at whole coordinates on the axis.
     pub(crate) fn flat(rotation: Matrix3<f64>, depth: f64, angle: f64, sides: [f64; 2]) -> Self {
-        Self { rotation, depth, offset: [0.0; 2], angle, height: [0.0; 12], bending: [0.0; 2], sides }
+        Self { rotation, depth, offset: [0.0; 2], angle, height: [0.0; 12], relief: None, bending: [0.0; 2], sides }
     }
 
     /// Unit normal of the tangent plane at the optical axis, camera frame.
@@ -80,9 +83,14 @@ impl Surface {
         next
     }
 
-    /// The state with all parameters from `count` on at their prior mean.
+    /// Whether nothing rises above the tangent plane.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.relief.is_none() && self.height.iter().all(|c| *c == 0.0)
+    }
+
+    /// The state without relief, with all parameters from `count` on at their prior mean.
     pub(crate) fn truncated(&self, count: usize, nominal_angle: f64) -> Self {
-        let mut cut = *self;
+        let mut cut = Self { relief: None, ..*self };
         for k in 0..12 {
             if 7 + k >= count {
                 cut.height[k] = 0.0;
@@ -113,6 +121,7 @@ impl Surface {
         for (c, (i, j)) in s.height.iter_mut().zip(TERMS) {
             *c /= m.powi(i + j - 1);
         }
+        s.relief = s.relief.map(|relief| relief.scaled(m));
         s.bending[0] /= m;
         s.bending[1] /= m;
         s
@@ -152,6 +161,7 @@ impl Surface {
         moved.depth = depth;
         moved.offset = chart.lattice(p.x, p.y);
         moved.height = self.height_about(p.x, p.y);
+        moved.relief = self.relief.map(|relief| relief.about([p.x, p.y], chart.arcs(p.x, p.y)));
         (moved.rotation[(2, 2)] > 0.1).then_some(moved)
     }
 

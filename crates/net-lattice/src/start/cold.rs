@@ -16,10 +16,11 @@ use crate::sheet::alike::ALIKE;
 use crate::sheet::fit::{Observation, Robust};
 use crate::sheet::model::{self, Model};
 use crate::sheet::surface::Surface;
+use crate::start::bumps::WAVERS;
 use crate::workspace::{Lock, Workspace};
 
 /// Windows of a cold lock-in, px of an 848 x 480 px picture, and the model that may move in each. The growth is the unwrapping.
-const COLD: [(f64, Model); 7] = [
+pub(crate) const COLD: [(f64, Model); 7] = [
     (90.0, Model::Rhomb),
     (160.0, Model::Rhomb),
     (250.0, Model::Quadratic),
@@ -39,7 +40,7 @@ const SURE: f64 = 5.5;
 /// Share of a candidate's score below which another is nothing beside it.
 const PART: f64 = 0.45;
 /// How often a sheet is followed outwards from where it is sure.
-const OUTWARDS: usize = 3;
+pub(crate) const OUTWARDS: usize = 3;
 /// Candidates of a bank of tiles that are refined to the end.
 const REFINED: usize = 16;
 /// Candidates that are looked through for a second net.
@@ -50,6 +51,8 @@ const DRAWN_CELL_PX: f64 = 20.0;
 const OTHER: f64 = 0.16;
 /// Side of a cell, px of an 848 x 480 px picture, of which no blur is half.
 const UNBLURRED_PX: f64 = 30.0;
+/// Passes on the drawing that many free coefficients need besides the first three.
+const BUMPY_PASSES: usize = 2;
 /// How much more than alike ones a bright family and a dark one must explain: of two families alike both explain one, so it is 1.4 to 2 times as much, and less than
 /// 1.05 of fish.
 const UNLIKE: f64 = 1.2;
@@ -105,6 +108,24 @@ impl Workspace {
             (lock, margin) = nearer;
         }
         self.focus(&mut lock);
+        let bumpy = self.over_bumps(&lock, false);
+        let found = self.seated(config, bumpy.unwrap_or(lock), margin)?;
+        let refused = found.probability < config.probability_threshold;
+        if bumpy.is_none() && refused && found.evidence.bumps > WAVERS {
+            // What cannot be claimed for what scatters about it: with a relief, or as it is.
+            let stages = self.stages;
+            if let Some(bumpy) = self.over_bumps(&lock, true)
+                && let Some(found) = self.seated(config, bumpy, margin)
+            {
+                return Some(found);
+            }
+            self.stages = stages;
+        }
+        Some(found)
+    }
+
+    /// What a lock comes to once it is where the twine is.
+    fn seated(&mut self, config: &Config, mut lock: Lock, margin: f64) -> Option<LatticeEstimate> {
         self.seat(&mut lock);
         self.stages = Some(Stages::new(&lock.start, &lock.surface));
         self.finish(config, lock, margin)
@@ -226,21 +247,10 @@ impl Workspace {
 
     /// The sheet fitted to what is found tile by tile from where it is sure outwards, and locked again.
     fn followed_outwards(&mut self, lock: &Lock) -> Option<Surface> {
-        let place = self.scale_for(lock.surface.depth);
-        let gain = self.demodulate(&lock.surface, place, &Window::ALL);
-        let comb = self.comb(&lock.surface, place, [1.0; 2], lock.seed.looks, gain);
-        let level = &self.view.levels[place.0];
-        let grid = &level.tiles[place.1];
-        let t = &mut self.tools;
-        if t.spread.start(&t.measurements, grid) == t.spread.grow(level, grid, &comb, gain) {
+        if !self.spread(lock, 0) {
             return None;
         }
-        t.observations.clear();
-        for (site, known) in grid.sites.iter().zip(&t.spread.known) {
-            let w = |f: usize| known.map_or(0.0, |k| k.snr[f].min(LOUDEST) * std::f64::consts::TAU.powi(2));
-            let s = known.map_or([0.0; 2], |k| k.s);
-            t.observations.push(Observation { site: *site, s, weight: [w(0), 0.0, w(1)] });
-        }
+        let t = &mut self.tools;
         // From the stiffest on: a sheet that curls up somewhere is no place to start from.
         let mut surface = lock.surface.truncated(Model::Rhomb.parameters(), self.prior.angle);
         for (model, scale) in [
@@ -254,6 +264,28 @@ impl Workspace {
             surface = t.fitter.fit(&surface, model.parameters(), &t.observations, robust, &self.prior, 4)?.surface;
         }
         self.lock(&surface, &COLD[5..], lock.seed)
+    }
+
+    /// Observes what is found tile by tile from where a sheet is sure outwards. `false` if that is nothing new, or not in more than `known` tiles.
+    pub(crate) fn spread(&mut self, lock: &Lock, known: usize) -> bool {
+        let place = self.scale_for(lock.surface.depth);
+        let gain = self.demodulate(&lock.surface, place, &Window::ALL);
+        let comb = self.comb(&lock.surface, place, [1.0; 2], lock.seed.looks, gain);
+        let level = &self.view.levels[place.0];
+        let grid = &level.tiles[place.1];
+        let t = &mut self.tools;
+        let sure = t.spread.start(&t.measurements, grid);
+        let grown = t.spread.grow(level, grid, &comb, gain);
+        if grown == sure || grown <= known {
+            return false;
+        }
+        t.observations.clear();
+        for (site, known) in grid.sites.iter().zip(&t.spread.known) {
+            let w = |f: usize| known.map_or(0.0, |k| k.snr[f].min(LOUDEST) * std::f64::consts::TAU.powi(2));
+            let s = known.map_or([0.0; 2], |k| k.s);
+            t.observations.push(Observation { site: *site, s, weight: [w(0), 0.0, w(1)] });
+        }
+        true
     }
 
     /// A polynomial sheet does not follow a net that bends in many ways all over the picture, and what it misses at the rim it makes up for on the axis,
@@ -281,7 +313,7 @@ impl Workspace {
     }
 
     /// How well the tiles agree with a locked sheet.
-    fn agreement(&mut self, surface: &Surface, looks: Looks) -> (f64, Evidence) {
+    pub(crate) fn agreement(&mut self, surface: &Surface, looks: Looks) -> (f64, Evidence) {
         self.measure_comb(surface, self.scale_for(surface.depth), looks, &Window::ALL);
         let e = self.evidence();
         // Range and normal are claimed on the axis: what agrees there counts twice.
@@ -313,11 +345,17 @@ impl Workspace {
     /// Refines a lock on the drawing, chooses the model, and says what is known of the result.
     fn finish(&mut self, config: &Config, lock: Lock, margin: f64) -> Option<LatticeEstimate> {
         let mut surface = lock.surface;
-        let mut model = Model::Bent;
+        let mut model = if surface.relief.is_some() { Model::Bumpy } else { Model::Bent };
         if let Some((fit, _)) = self.likelihood(&surface, &lock, model, 2, true)
             && let Some((fit, _)) = self.likelihood(&fit.surface, &lock, model, 1, false)
         {
             surface = fit.surface;
+            if model == Model::Bumpy {
+                for _ in 0..BUMPY_PASSES {
+                    surface = self.likelihood(&surface, &lock, model, 1, false)?.0.surface;
+                }
+                return self.conclude(config, &surface, &lock, model, margin, None);
+            }
             let alike = ALIKE[self.view.tiling_for(self.cell_px(surface.depth))];
             let t = &mut self.tools;
             if let Some(choice) =

@@ -47,7 +47,14 @@ impl Workspace {
         let reach = REACH_PX[self.view.tiling_for(self.cell_px(surface.depth))] * self.view.size;
         let t = &mut self.tools;
         let scale = model::robust_scale(t.fitter.whiten(&t.observations), &mut t.scratch);
-        let doubt = Doubt { scale, reach, side_ratio: config.side_ratio_sigma, bumps: evidence.bumps };
+        // What a relief leaves open is in its covariance: nothing is too short for it that would turn the normal.
+        let bumpy = model == Model::Bumpy;
+        let bumps = if bumpy { 0.0 } else { evidence.bumps };
+        let strain =
+            surface.relief.map_or([0.0; 2], |relief| relief.strain(config.height_sigma_m, config.height_length_m));
+        let evidence = Evidence { bumps, strain, ..evidence };
+        let formal = if bumpy { 1.0 } else { covariance::FORMAL };
+        let doubt = Doubt { formal, scale, reach, side_ratio: config.side_ratio_sigma, bumps: evidence.bumps };
         let errors = covariance::errors(
             &t.fitter,
             &fit,
@@ -87,7 +94,7 @@ impl Workspace {
     /// Mean plane of the sheet within 220 px (848 x 480 px) of the axis.
     fn mean_plane(&self, surface: &Surface) -> Plane {
         let tangent = Plane { normal: surface.normal(), distance: surface.depth * surface.rotation[(2, 2)] };
-        if surface.height.iter().all(|c| *c == 0.0) {
+        if surface.is_flat() {
             return tangent;
         }
         let chart = surface.chart();
@@ -119,7 +126,8 @@ impl Workspace {
 
 /// Principal curvatures on the axis, larger magnitude first. The normal points away from the camera, so a positive height is farther away.
 fn curvatures(surface: &Surface) -> [f64; 2] {
-    let [a, b, c] = [surface.height[0], surface.height[1], surface.height[2]];
+    let bumps = surface.relief.map_or([0.0; 3], |relief| relief.curvature());
+    let [a, b, c] = std::array::from_fn(|k| surface.height[k] + bumps[k]);
     let mean = 0.5 * (a + c);
     let half = (0.25 * (a - c) * (a - c) + b * b).sqrt();
     let (p, q) = (mean + half, mean - half);

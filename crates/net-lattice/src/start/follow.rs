@@ -39,7 +39,9 @@ impl Workspace {
         surface.offset = std::array::from_fn(|f| start.offset[f] - half[f]);
         let seed = Seed { centre: self.view.centre, looks: last.looks };
         let place = self.coarse_scale_for(start.depth);
-        for (radius, model) in [(NEAR, Model::Rhomb), (last.focus, last.model.max(Model::Rhomb))] {
+        // A relief is carried along as it is until the drawing tells its coefficients.
+        let settled = if last.model == Model::Bumpy { Model::Quadratic } else { last.model.max(Model::Rhomb) };
+        for (radius, model) in [(NEAR, Model::Rhomb), (last.focus, settled)] {
             let gain = self.sums_at(&surface, place);
             self.comb(&surface, place, [1.0; 2], seed.looks, gain);
             self.observe_measured(&self.window(radius));

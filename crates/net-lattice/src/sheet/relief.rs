@@ -1,0 +1,383 @@
+//! Bumps that no polynomial follows: a bicubic spline over the tangent plane at the optical axis, and how the threads through the axis stray from parabolas.
+//!
+//! The coefficients' prior makes the spline a smooth random field with the deviation and the correlation length of [`crate::Config`]: nowhere does it
+//! bend for what lies elsewhere, as a polynomial's rim does, and where nothing is seen it has its prior's spread. Its value and slopes at the axis are taken off, so
+//! that depth and normal there are still the sheet's own. A net of unstretchable twine is laid out by two threads (a Chebyshev net); bumps make them stray.
+
+use net_geometry::nalgebra::SMatrix;
+
+/// Coefficients along each side of the grid.
+const SIDE: usize = 12;
+/// Of the grid.
+const GRID: usize = SIDE * SIDE;
+/// Of the grid, and of a thread of each family.
+pub(crate) const COEFFICIENTS: usize = GRID + 2 * SIDE;
+/// Gaps between coefficients that the spline describes.
+const GAPS: f64 = (SIDE - 3) as f64;
+/// Distance of coefficients over the correlation length.
+const SPACING: f64 = 0.8;
+/// Standard deviation of how far threads stray, m: bumps of the default height, seen from tangent planes turned by the default slope.
+const STRAY: f64 = 0.003;
+
+/// Derivatives by the coefficients.
+pub(crate) type Row = [f64; COEFFICIENTS];
+
+/// Heights above the polynomial, m, and threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relief {
+    /// Place of the first coefficient in the tangent plane, m, and the distance from one to the next.
+    origin: [f64; 2],
+    spacing: f64,
+    /// The same distance along the threads, and where the axis is on them, m.
+    along: f64,
+    axis: [f64; 2],
+    coefficients: Row,
+    /// Value and slopes of the spline itself where the axis meets the sheet.
+    tangent: [f64; 3],
+    /// Value and slope of each thread's own spline there.
+    straight: [[f64; 2]; 2],
+}
+
+/// Four coefficients side by side: the first one, their weights, and the weights' slopes, 1/m.
+#[derive(Debug, Clone, Copy)]
+struct Four {
+    first: usize,
+    value: [f64; 4],
+    slope: [f64; 4],
+}
+
+impl Four {
+    /// At a place, counted in coefficients. Beyond the gaps the spline is level.
+    #[inline(always)]
+    fn new(place: f64, spacing: f64) -> Self {
+        let inside = place.clamp(1.0, 1.0 + GAPS - 1e-9);
+        let gap = inside.floor();
+        let u = inside - gap;
+        let v = 1.0 - u;
+        let value = [
+            v * v * v / 6.0,
+            (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
+            (4.0 - 6.0 * v * v + 3.0 * v * v * v) / 6.0,
+            u * u * u / 6.0,
+        ];
+        let per = if inside == place { 1.0 / spacing } else { 0.0 };
+        let slope = [-0.5 * v * v, 0.5 * u * (3.0 * u - 4.0), 0.5 * v * (4.0 - 3.0 * v), 0.5 * u * u];
+        // A place that is no number has no weights that are.
+        Self { first: (gap as usize).clamp(1, SIDE - 3) - 1, value, slope: slope.map(|s| s * per) }
+    }
+}
+
+fn dot(a: &[f64; 4], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Relief {
+    /// Level, about the axis and as far as `low` and `high` of the tangent plane, m, if bumps of this correlation length, m, can be described so far.
+    pub(crate) fn level(low: [f64; 2], high: [f64; 2], length: f64) -> Self {
+        let spacing = SPACING * length;
+        let half = 0.5 * GAPS * spacing;
+        let origin = std::array::from_fn(|k| {
+            let middle = 0.5 * (low[k] + high[k]);
+            let middle = if high[k] - low[k] > 2.0 * half { middle.clamp(-0.5 * half, 0.5 * half) } else { middle };
+            middle - 0.5 * (SIDE - 1) as f64 * spacing
+        });
+        let farthest = low.into_iter().chain(high).fold(0.0, |m: f64, p| m.max(p.abs()));
+        let along = f64::max(spacing, 2.0 * farthest.min(2.0 * half) / GAPS);
+        let coefficients = [0.0; COEFFICIENTS];
+        Self { origin, spacing, along, axis: [0.0; 2], coefficients, tangent: [0.0; 3], straight: [[0.0; 2]; 2] }
+    }
+
+    pub(crate) fn coefficients(&self) -> &Row {
+        &self.coefficients
+    }
+
+    /// With `by` of these steps added to the coefficients.
+    pub(crate) fn stepped(mut self, steps: &[f64], by: f64) -> Self {
+        self.coefficients.iter_mut().zip(steps).for_each(|(c, s)| *c += by * s);
+        self.settled()
+    }
+
+    /// The same in a picture at another depth: everything grows with it.
+    pub(crate) fn scaled(mut self, m: f64) -> Self {
+        self.origin.iter_mut().for_each(|o| *o *= m);
+        self.spacing *= m;
+        self.along *= m;
+        self.axis.iter_mut().for_each(|a| *a *= m);
+        self.coefficients.iter_mut().for_each(|c| *c *= m);
+        self.settled()
+    }
+
+    /// The same where the axis meets the sheet in another place of the tangent plane, `arcs` along the two families.
+    pub(crate) fn about(mut self, [x, y]: [f64; 2], arcs: [f64; 2]) -> Self {
+        self.origin = [self.origin[0] - x, self.origin[1] - y];
+        self.axis = [self.axis[0] + arcs[1], self.axis[1] + arcs[0]];
+        self.settled()
+    }
+
+    /// What is taken off at the axis.
+    fn settled(mut self) -> Self {
+        (self.tangent, self.straight) = ([0.0; 3], [[0.0; 2]; 2]);
+        self.tangent = self.at(0.0, 0.0);
+        self.straight = [0, 1].map(|family| {
+            let four = self.thread(family, 0.0);
+            let c = &self.coefficients[GRID + family * SIDE + four.first..];
+            [dot(&four.value, c), dot(&four.slope, c)]
+        });
+        self
+    }
+
+    fn column(&self, x: f64) -> Four {
+        Four::new((x - self.origin[0]) / self.spacing, self.spacing)
+    }
+
+    fn row(&self, y: f64) -> Four {
+        Four::new((y - self.origin[1]) / self.spacing, self.spacing)
+    }
+
+    fn thread(&self, family: usize, s: f64) -> Four {
+        Four::new((s + self.axis[family]) / self.along + 0.5 * (SIDE - 1) as f64, self.along)
+    }
+
+    /// Whether the spline describes a place.
+    pub(crate) fn covers(&self, x: f64, y: f64) -> bool {
+        [x, y].iter().zip(self.origin).all(|(p, o)| (1.0..=1.0 + GAPS).contains(&((p - o) / self.spacing)))
+    }
+
+    /// Height and slopes at `(x, y)` of the tangent plane.
+    #[inline]
+    pub(crate) fn at(&self, x: f64, y: f64) -> [f64; 3] {
+        let (column, row) = (self.column(x), self.row(y));
+        let [t, tx, ty] = self.tangent;
+        let mut sum = [-t - tx * x - ty * y, -tx, -ty];
+        for j in 0..4 {
+            let c = &self.coefficients[(row.first + j) * SIDE + column.first..][..4];
+            let (h, hx) = (dot(&column.value, c), dot(&column.slope, c));
+            sum[0] += row.value[j] * h;
+            sum[1] += row.value[j] * hx;
+            sum[2] += row.slope[j] * h;
+        }
+        sum
+    }
+
+    /// How far the thread of a family through the axis strays, m, where the other family's arc is `s`, m.
+    #[inline]
+    pub(crate) fn aside(&self, family: usize, s: f64) -> f64 {
+        let four = self.thread(family, s);
+        let [value, slope] = self.straight[family];
+        dot(&four.value, &self.coefficients[GRID + family * SIDE + four.first..]) - value - slope * s
+    }
+
+    /// Second derivatives at the axis: xx, xy, yy.
+    pub(crate) fn curvature(&self) -> [f64; 3] {
+        let h = 1e-3 * self.spacing;
+        let [right, left] = [self.at(h, 0.0), self.at(-h, 0.0)];
+        let [below, above] = [self.at(0.0, h), self.at(0.0, -h)];
+        [right[1] - left[1], right[2] - left[2], below[2] - above[2]].map(|d| 0.5 * d / h)
+    }
+
+    /// Adds the inverse covariance of the coefficients of fields with this deviation, m, and correlation length, m.
+    pub(crate) fn add_precision(&self, deviation: f64, length: f64, a: &mut [Row]) {
+        let (grid, threads) = (precision(self.spacing, length), precision(self.along, length));
+        let (of_grid, of_threads) = (deviation.powi(-2), STRAY.powi(-2));
+        for (k, row) in a.iter_mut().enumerate() {
+            if k < GRID {
+                for (l, a) in row[..GRID].iter_mut().enumerate() {
+                    *a += of_grid * grid[k / SIDE][l / SIDE] * grid[k % SIDE][l % SIDE];
+                }
+            } else {
+                let first = GRID + (k - GRID) / SIDE * SIDE;
+                for (a, p) in row[first..first + SIDE].iter_mut().zip(&threads[(k - GRID) % SIDE]) {
+                    *a += of_threads * p;
+                }
+            }
+        }
+    }
+}
+
+impl Relief {
+    /// How unlikely the bumps, and what the threads stray, are under the prior: sums of squares of as many standard deviations as are seen, some tens of the grid and some of the threads.
+    pub(crate) fn strain(&self, deviation: f64, length: f64) -> [f64; 2] {
+        let (grid, threads) = (precision(self.spacing, length), precision(self.along, length));
+        let bilinear = |p: &[[f64; SIDE]; SIDE], a: &[f64], b: &[f64]| -> f64 {
+            (0..SIDE).map(|i| a[i] * (0..SIDE).map(|j| p[i][j] * b[j]).sum::<f64>()).sum()
+        };
+        let row = |j: usize| &self.coefficients[j * SIDE..][..SIDE];
+        let rows = |j: usize| (0..SIDE).map(|k| grid[j][k] * bilinear(&grid, row(j), row(k))).sum::<f64>();
+        let bumps = (0..SIDE).map(rows).sum::<f64>();
+        let stray = [SIDE, SIDE + 1].map(|j| bilinear(&threads, row(j), row(j))).iter().sum::<f64>();
+        [bumps / deviation.powi(2), stray / STRAY.powi(2)]
+    }
+}
+
+/// Inverse covariance of coefficients so far apart, m, whose field has variance 1 and this correlation length, m.
+fn precision(spacing: f64, length: f64) -> [[f64; SIDE]; SIDE] {
+    /// A cubic B-spline's products with itself moved by so many gaps.
+    const B: [f64; 4] = [151.0 / 315.0, 397.0 / 1680.0, 1.0 / 42.0, 1.0 / 5040.0];
+    // A spline of correlated coefficients is correlated over both lengths; the spline's own is that of a Gaussian of variance 2/3.
+    let own = length * length - 2.0 / 3.0 * spacing * spacing;
+    let alike = |gaps: usize| match gaps {
+        0 => 1.0,
+        _ if own > 0.0 => (-0.5 * (gaps as f64 * spacing).powi(2) / own).exp(),
+        _ => 0.0,
+    };
+    let variance = B[0] + 2.0 * (1..4).map(|n| B[n] * alike(n)).sum::<f64>();
+    let covariance = SMatrix::<f64, SIDE, SIDE>::from_fn(|i, j| alike(i.abs_diff(j)) / variance);
+    let inverse = covariance.try_inverse().unwrap_or_else(SMatrix::identity);
+    std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)]))
+}
+
+/// Derivatives of both lattice coordinates by the coefficients, while they are summed up.
+pub(crate) struct Rows<'a> {
+    relief: &'a Relief,
+    rows: &'a mut [Row; 2],
+    /// What is to be taken off as the spline's value and slopes at the axis.
+    axis: [[f64; 3]; 2],
+}
+
+impl<'a> Rows<'a> {
+    pub(crate) fn new(relief: &'a Relief, rows: &'a mut [Row; 2]) -> Self {
+        Self { relief, rows, axis: [[0.0; 3]; 2] }
+    }
+
+    /// Adds of each coordinate `by` times the derivatives of the height at a place.
+    pub(crate) fn add_height(&mut self, x: f64, y: f64, by: [f64; 2]) {
+        let (column, row) = (self.relief.column(x), self.relief.row(y));
+        let weight = |i: usize, j: usize| column.value[i] * row.value[j];
+        self.add([row.first, column.first], by, weight);
+        for (axis, by) in self.axis.iter_mut().zip(by) {
+            axis.iter_mut().zip([1.0, x, y]).for_each(|(a, p)| *a += by * p);
+        }
+    }
+
+    /// The same of the slope along a way `(cx, cy)`.
+    pub(crate) fn add_slope(&mut self, x: f64, y: f64, [cx, cy]: [f64; 2], by: [f64; 2]) {
+        let (column, row) = (self.relief.column(x), self.relief.row(y));
+        let weight = |i: usize, j: usize| cx * column.slope[i] * row.value[j] + cy * column.value[i] * row.slope[j];
+        self.add([row.first, column.first], by, weight);
+        for (axis, by) in self.axis.iter_mut().zip(by) {
+            axis[1] += by * cx;
+            axis[2] += by * cy;
+        }
+    }
+
+    fn add(&mut self, first: [usize; 2], by: [f64; 2], weight: impl Fn(usize, usize) -> f64) {
+        for j in 0..4 {
+            let at = (first[0] + j) * SIDE + first[1];
+            for i in 0..4 {
+                let w = weight(i, j);
+                self.rows.iter_mut().zip(by).for_each(|(row, by)| row[at + i] += by * w);
+            }
+        }
+    }
+
+    /// The same of how far a family's thread strays where the other family's arc is `s`.
+    pub(crate) fn add_aside(&mut self, family: usize, s: f64, by: [f64; 2]) {
+        let (here, axis) = (self.relief.thread(family, s), self.relief.thread(family, 0.0));
+        let at = GRID + family * SIDE;
+        for (row, by) in self.rows.iter_mut().zip(by) {
+            for k in 0..4 {
+                row[at + here.first + k] += by * here.value[k];
+                row[at + axis.first + k] -= by * (axis.value[k] + axis.slope[k] * s);
+            }
+        }
+    }
+
+    /// Takes off what the axis keeps.
+    pub(crate) fn settle(mut self) {
+        let (column, row) = (self.relief.column(0.0), self.relief.row(0.0));
+        let first = [row.first, column.first];
+        for (f, [h, hx, hy]) in self.axis.into_iter().enumerate() {
+            let by = std::array::from_fn(|k| if k == f { -1.0 } else { 0.0 });
+            let (cv, cs, rv, rs) = (column.value, column.slope, row.value, row.slope);
+            self.add(first, by, |i, j| h * cv[i] * rv[j] + hx * cs[i] * rv[j] + hy * cv[i] * rs[j]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bumpy() -> Relief {
+        let steps: Row = std::array::from_fn(|k| 0.03 * f64::sin(1.7 * k as f64));
+        Relief::level([-0.8, -0.7], [0.7, 0.8], 0.25).stepped(&steps, 1.0)
+    }
+
+    #[test]
+    fn the_axis_keeps_its_depth_and_normal() {
+        for r in [bumpy(), bumpy().scaled(1.5), bumpy().about([0.2, -0.1], [0.2, -0.1])] {
+            // differences of sums of sixteen: rounding only
+            assert!(r.at(0.0, 0.0).into_iter().all(|v| v.abs() < 1e-15), "{:?}", r.at(0.0, 0.0));
+            assert!(r.aside(0, 0.0).abs() < 1e-15 && (r.aside(1, 1e-6) - r.aside(1, -1e-6)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_heights_and_rows_those_of_the_coefficients() {
+        let r = bumpy();
+        for (x, y) in [(0.3, 0.2), (-0.6, 0.41), (0.01, -0.4), (2.0, 0.1)] {
+            let [h, hx, hy] = r.at(x, y);
+            let d = 1e-6;
+            // second derivatives are below 5 / m
+            assert!(((r.at(x + d, y)[0] - h) / d - hx).abs() < 1e-5 && ((r.at(x, y + d)[0] - h) / d - hy).abs() < 1e-5);
+            let mut rows = [[0.0; COEFFICIENTS]; 2];
+            let mut sums = Rows::new(&r, &mut rows);
+            sums.add_height(x, y, [2.0, -1.0]);
+            sums.add_slope(x, y, [0.5, -0.3], [1.0, 3.0]);
+            sums.add_aside(0, 0.4, [0.2, 0.7]);
+            sums.settle();
+            let by = |f: usize| rows[f].iter().zip(r.coefficients()).map(|(a, c)| a * c).sum::<f64>();
+            let slope = 0.5 * hx - 0.3 * hy;
+            assert!((by(0) - (2.0 * h + slope + 0.2 * r.aside(0, 0.4))).abs() < 1e-12);
+            assert!((by(1) - (-h + 3.0 * slope + 0.7 * r.aside(0, 0.4))).abs() < 1e-12);
+        }
+        let (d, [xx, xy, yy]) = (1e-4, r.curvature());
+        let (right, below) = (r.at(d, 0.0), r.at(0.0, d));
+        // third derivatives are below 50 / m^2
+        assert!([right[1] / d - xx, right[2] / d - xy, below[2] / d - yy].into_iter().all(|v| v.abs() < 1e-2));
+    }
+
+    #[test]
+    fn another_axis_sees_the_same_bumps() {
+        let (r, moved) = (bumpy(), bumpy().about([0.2, -0.1], [0.2, -0.1]));
+        let (a, b) = (r.at(0.5, 0.3), moved.at(0.3, 0.4));
+        let [h, hx, hy] = r.at(0.2, -0.1);
+        let along = (r.aside(0, 0.2) - r.aside(0, -0.1)) - (moved.aside(0, 0.3) - moved.aside(0, 0.0));
+        let slope = (r.aside(0, -0.1 + 1e-6) - r.aside(0, -0.1 - 1e-6)) / 2e-6;
+        // the thread's slope where the axis is now is taken off; differences over 2e-6 are known to 1e-10
+        assert!((along - 0.3 * slope).abs() < 1e-9, "{along} {slope}");
+        assert!((a[0] - (b[0] + h + hx * 0.3 + hy * 0.4)).abs() < 1e-14 && (a[1] - b[1] - hx).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_prior_is_a_field_of_its_deviation_and_length() {
+        let (deviation, length) = (0.022, 0.36);
+        let r = Relief::level([-1.0, -1.0], [1.0, 1.0], length);
+        let mut a = vec![[0.0; COEFFICIENTS]; COEFFICIENTS];
+        r.add_precision(deviation, length, &mut a);
+        let precision = SMatrix::<f64, GRID, GRID>::from_fn(|i, j| a[i][j]);
+        let covariance = Box::new(precision).try_inverse().expect("positive definite");
+        let by = |x: f64, y: f64| {
+            let (column, row) = (r.column(x), r.row(y));
+            let mut w = [0.0; GRID];
+            for j in 0..4 {
+                (0..4).for_each(|i| w[(row.first + j) * SIDE + column.first + i] = column.value[i] * row.value[j]);
+            }
+            w
+        };
+        let between = |p: [f64; GRID], q: [f64; GRID]| {
+            (0..GRID).map(|i| p[i] * (0..GRID).map(|j| covariance[(i, j)] * q[j]).sum::<f64>()).sum::<f64>()
+        };
+        for (x, y) in [(0.0, 0.0), (0.31, -0.17), (-0.5, 0.44)] {
+            let here = by(x, y);
+            let own = between(here, here) / deviation.powi(2);
+            // A spline is not the same everywhere: a tenth of the variance between coefficients and on them.
+            assert!((own - 1.0).abs() < 0.1, "variance {own}");
+            for d in [0.5 * length, length, 1.5 * length] {
+                let alike = between(here, by(x + d, y)) / deviation.powi(2);
+                let gauss = (-0.5 * (d / length).powi(2)).exp();
+                assert!((alike - gauss).abs() < 0.1, "{alike} over {d} m, {gauss}");
+            }
+        }
+    }
+}
