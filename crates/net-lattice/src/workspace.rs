@@ -156,6 +156,7 @@ impl Workspace {
                 sigma: surface::prior(config),
                 angle: mesh.angle(),
                 bumps: [config.height_sigma_m, config.height_length_m],
+                held: 0.0,
             },
             banks,
             spectra: Spectra::new(),

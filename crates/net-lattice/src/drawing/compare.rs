@@ -2,10 +2,14 @@
 
 use crate::drawing::likelihood::Drawing;
 use crate::drawing::polarity::Polarity;
-use crate::sheet::fit::{Fit, Robust};
+use crate::sheet::fit::{Fit, Prior, Robust};
 use crate::sheet::model::Model;
 use crate::sheet::surface::Surface;
 use crate::workspace::{Lock, Workspace};
+
+/// How many times as much as their prior the bumps of the last picture count in the next: a net does not change its shape from frame to frame. Of 3, 10 and 30 the last two are as good on
+/// a path-traced sequence (the normal 0.54 degrees off its true tangent in the median, where the first has 0.74).
+const HELD: f64 = 10.0;
 
 impl Workspace {
     /// How to draw and compare a net at `depth` on `level`, high-passed for cells of `cell` px.
@@ -88,6 +92,7 @@ impl Workspace {
         let drawing = Drawing { sparse, quick, ..self.drawing(level, cell, lock.polarity, lock.blur) };
         let t = &mut self.tools;
         let view = &self.view.levels[level];
+        let prior = Prior { held: if lock.quick { HELD } else { 0.0 }, ..self.prior };
         let mut fit = None;
         let mut surface = *surface;
         for _ in 0..passes {
@@ -104,7 +109,7 @@ impl Workspace {
             let done = if lock.quick && model != Model::Bumpy {
                 t.fitter.settle(&surface, model.parameters(), &t.observations, robust, &self.prior)?
             } else {
-                t.fitter.fit_model(&surface, model, &t.observations, robust, &self.prior, 2)?
+                t.fitter.fit_model(&surface, model, &t.observations, robust, &prior, 2)?
             };
             surface = done.surface;
             fit = Some((done, robust));

@@ -200,7 +200,7 @@ mod tests {
                 Site::new(&camera, 26.0 + SPACING * x, 28.0 + SPACING * y)
             })
             .collect();
-        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.0; 2] };
+        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.0; 2], held: 0.0 };
         prior.sigma[7..].fill(10.0);
         let (mut fitter, mut influences) = (Fitter::default(), Vec::new());
         // Knuth's linear congruence, to uniform values of variance 1.

@@ -4,7 +4,7 @@ use crate::numeric::Normal;
 use crate::sheet::chart::Point;
 use crate::sheet::fit::{Fit, Fitter, Observation, Prior, Robust, damped, sound};
 use crate::sheet::relief::{COEFFICIENTS, Row};
-use crate::sheet::surface::{PARAMETERS, SHAPE, Surface};
+use crate::sheet::surface::{PARAMETERS, Params, SHAPE, Surface};
 use net_image::widely;
 
 /// Terms of the polynomial that stay beside the relief: the quadratic ones.
@@ -123,18 +123,18 @@ impl Fitter {
         fixed.sigma[SHAPE + QUADRATIC..SHAPE + start.height.len()].fill(0.0);
         let mut surface = *start;
         surface.height[QUADRATIC..].fill(0.0);
+        let before = *start.relief.as_ref()?.coefficients();
         let mut fit = None;
         for _ in 0..iterations {
             self.linearize_quickly(&surface, PARAMETERS, observations);
-            let mut n = self.normal(&surface, PARAMETERS, observations, robust, &fixed);
-            self.add_bumps(&surface, observations, robust, prior.bumps)?;
-            let bumps = &mut self.bumps;
-            bumps.eliminate()?;
-            bumps.reduce(&mut n);
-            let (mut d, covariance) = n.solve(PARAMETERS)?;
-            bumps.substitute(&d);
+            let n = self.normal(&surface, PARAMETERS, observations, robust, &fixed);
+            let (mut d, mut covariance) = self.eliminated(&surface, observations, robust, prior, Some(&before), &n)?;
             let damp = damped(&mut d);
-            let relief = surface.relief?.stepped(&bumps.b, damp);
+            let relief = surface.relief?.stepped(&self.bumps.b, damp);
+            if prior.held > 0.0 {
+                // What was held is no new evidence.
+                covariance = self.eliminated(&surface, observations, robust, prior, None, &n)?.1;
+            }
             surface = Surface { relief: Some(relief), ..surface.stepped(&d) };
             if !sound(&surface, prior) {
                 return None;
@@ -151,21 +151,46 @@ impl Fitter {
         fit
     }
 
+    /// Step of the parameters, and their covariance, with the coefficients eliminated, whose step is left in `bumps.b`. `before`: coefficients that are held to.
+    fn eliminated(
+        &mut self,
+        surface: &Surface,
+        observations: &[Observation],
+        robust: Robust,
+        prior: &Prior,
+        before: Option<&Row>,
+        n: &Normal<PARAMETERS>,
+    ) -> Option<(Params, [[f64; PARAMETERS]; PARAMETERS])> {
+        self.add_bumps(surface, observations, robust, prior, before)?;
+        let mut left = n.clone();
+        self.bumps.eliminate()?;
+        self.bumps.reduce(&mut left);
+        let (d, covariance) = left.solve(PARAMETERS)?;
+        self.bumps.substitute(&d);
+        Some((d, covariance))
+    }
+
     /// Normal equations of the coefficients at the last linearization.
     fn add_bumps(
         &mut self,
         surface: &Surface,
         observations: &[Observation],
         robust: Robust,
-        [deviation, length]: [f64; 2],
+        prior: &Prior,
+        before: Option<&Row>,
     ) -> Option<()> {
         let relief = surface.relief.as_ref()?;
         let chart = surface.chart();
         let mut bumps = std::mem::take(&mut self.bumps);
         bumps.clear();
+        let [deviation, length] = prior.bumps;
         relief.add_precision(deviation, length, &mut bumps.a);
-        for (row, b) in bumps.a.iter().zip(&mut bumps.b) {
-            *b = -row.iter().zip(relief.coefficients()).map(|(a, c)| a * c).sum::<f64>();
+        let held = before.map_or(0.0, |_| prior.held);
+        let c = relief.coefficients();
+        let off: Row = std::array::from_fn(|k| (1.0 + held) * c[k] - held * before.map_or(0.0, |before| before[k]));
+        for (row, b) in bumps.a.iter_mut().zip(&mut bumps.b) {
+            *b = -row.iter().zip(&off).map(|(a, c)| a * c).sum::<f64>();
+            row.iter_mut().for_each(|a| *a *= 1.0 + held);
         }
         for ((o, r), depth) in observations.iter().zip(&self.residuals).zip(&self.depth) {
             let mut rows = [[0.0; COEFFICIENTS]; 2];
@@ -273,7 +298,7 @@ mod tests {
     fn the_sheet_that_was_observed_is_found() {
         let truth = bumpy();
         let observations = observations(&truth);
-        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.022, 0.36] };
+        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.022, 0.36], held: 0.0 };
         prior.sigma[SHAPE..].fill(0.3);
         let relief = Relief::level([-0.9, -0.6], [0.9, 0.6], 0.36);
         let turned = Rotation3::new(Vector3::new(0.04, -0.03, 0.01)).into_inner() * truth.rotation;
@@ -299,7 +324,7 @@ mod tests {
     fn derivatives_left_behind_follow_the_coefficients() {
         let truth = bumpy();
         let observations = observations(&truth);
-        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.022, 0.36] };
+        let mut prior = Prior { sigma: [f64::INFINITY; PARAMETERS], angle: 1.5, bumps: [0.022, 0.36], held: 0.0 };
         prior.sigma[SHAPE..].fill(0.3);
         let mut fitter = Fitter::default();
         let fit_to = |fitter: &mut Fitter, observations: &[Observation]| {

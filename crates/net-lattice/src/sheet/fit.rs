@@ -51,6 +51,8 @@ pub(crate) struct Prior {
     pub angle: f64,
     /// Standard deviation of bumps, m, and their correlation length, m.
     pub bumps: [f64; 2],
+    /// How many times as much as the prior the bumps of the start count: those of the last picture.
+    pub held: f64,
 }
 
 /// What a fit ends with.

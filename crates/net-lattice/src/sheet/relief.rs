@@ -19,6 +19,9 @@ const SPACING: f64 = 0.8;
 /// Standard deviation of how far threads stray, m: bumps of the default height, seen from tangent planes turned by the default slope.
 const STRAY: f64 = 0.003;
 
+/// Coefficients between the axis and the middle of what is described, from which that is moved by one.
+const STRAYED: f64 = 2.0;
+
 /// Derivatives by the coefficients.
 pub(crate) type Row = [f64; COEFFICIENTS];
 
@@ -111,6 +114,24 @@ impl Relief {
     pub(crate) fn about(mut self, [x, y]: [f64; 2], arcs: [f64; 2]) -> Self {
         self.origin = [self.origin[0] - x, self.origin[1] - y];
         self.axis = [self.axis[0] + arcs[1], self.axis[1] + arcs[0]];
+        let middle = 0.5 * (SIDE - 1) as f64;
+        for k in 0..2 {
+            // From the axis to the middle of what is described, in coefficients.
+            let off = (self.origin[k] / self.spacing + middle, -self.axis[k] / self.along);
+            if off.0.abs() > STRAYED {
+                let step = off.0.signum();
+                self.origin[k] -= step * self.spacing;
+                let stride = [1, SIDE][k];
+                for line in 0..SIDE {
+                    roll(&mut self.coefficients, line * [SIDE, 1][k], stride, step);
+                }
+            }
+            if off.1.abs() > STRAYED {
+                let step = off.1.signum();
+                self.axis[k] += step * self.along;
+                roll(&mut self.coefficients, GRID + k * SIDE, 1, step);
+            }
+        }
         self.settled()
     }
 
@@ -206,6 +227,16 @@ impl Relief {
         let bumps = (0..SIDE).map(rows).sum::<f64>();
         let stray = [SIDE, SIDE + 1].map(|j| bilinear(&threads, row(j), row(j))).iter().sum::<f64>();
         [bumps / deviation.powi(2), stray / STRAY.powi(2)]
+    }
+}
+
+/// Moves the coefficients along a line by one place, where the line begins a place earlier (a positive step) or later; what is new is as its neighbour.
+fn roll(of: &mut Row, first: usize, stride: usize, step: f64) {
+    let at = |k: usize| first + k * stride;
+    if step > 0.0 {
+        (1..SIDE).rev().for_each(|k| of[at(k)] = of[at(k - 1)]);
+    } else {
+        (1..SIDE).for_each(|k| of[at(k - 1)] = of[at(k)]);
     }
 }
 
@@ -347,6 +378,23 @@ mod tests {
         // the thread's slope where the axis is now is taken off; differences over 2e-6 are known to 1e-10
         assert!((along - 0.3 * slope).abs() < 1e-9, "{along} {slope}");
         assert!((a[0] - (b[0] + h + hx * 0.3 + hy * 0.4)).abs() < 1e-14 && (a[1] - b[1] - hx).abs() < 1e-14);
+    }
+
+    #[test]
+    fn what_is_described_goes_along_with_the_axis() {
+        let r = bumpy();
+        let mut moved = r;
+        for _ in 0..12 {
+            moved = moved.about([0.1, -0.05], [0.1, -0.05]);
+            assert!(moved.covers(0.0, 0.0), "the axis has left what is described");
+        }
+        let height =
+            |of: &Relief, x: f64, y: f64| of.at(x, y)[0] - 0.5 * (of.at(x - 0.05, y)[0] + of.at(x + 0.05, y)[0]);
+        // Bumps that were described at first, and still are: 1.2 m farther along x, 0.6 m along y. Second differences know nothing of the tangent.
+        for (x, y) in [(0.55, -0.3), (0.45, -0.15)] {
+            let (a, b) = (height(&r, x, y), height(&moved, x - 1.2, y + 0.6));
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
     }
 
     #[test]

@@ -9,8 +9,10 @@ use crate::lock::seed::Seed;
 use crate::picture::smooth::Smoother;
 use crate::picture::window::Window;
 use crate::sheet::chart::Chart;
+use crate::sheet::fit::Robust;
 use crate::sheet::model::Model;
 use crate::sheet::surface::Surface;
+use crate::start::bumps::WAVERS;
 use crate::workspace::{Lock, Workspace};
 
 /// Side of a cell, px, that is fine enough to draw where all that is to be found is the rest of a prediction: a fourth of the pixels of a first picture's, each of them of a
@@ -24,6 +26,9 @@ const NEAR: f64 = 250.0;
 const TURNED_CELLS: f64 = 0.1;
 /// One tile in so many may lose more, where a polynomial sheet rolls up at the rim.
 const TURNED_TILES: usize = 12;
+
+/// How residuals about a polynomial lose their weight where a relief was fitted before: a tenth of a cell is off.
+const STIFFER: Robust = Robust::Tile(0.1);
 
 impl Workspace {
     /// The sheet of the last picture, moved as predicted, locked and refined.
@@ -63,7 +68,21 @@ impl Workspace {
             drawn_cell_px: DRAWN_CELL_PX,
             quick: true,
         };
-        self.conclude(config, &surface, &lock, last.model, last.margin, Some(last.labels))
+        let found = self.conclude(config, &surface, &lock, last.model, last.margin, Some(last.labels))?;
+        let stiffer = (last.model == Model::Bumpy).then(|| self.stiffer(config, &found, &lock)).flatten();
+        Some(stiffer.unwrap_or(found))
+    }
+
+    /// The sheet without a relief, if a polynomial follows as many tiles and can be claimed: it is stiffer, and so its tangent steadier.
+    fn stiffer(&mut self, config: &Config, bumpy: &LatticeEstimate, lock: &Lock) -> Option<LatticeEstimate> {
+        let model = Model::Bent;
+        let start = bumpy.surface.truncated(Model::Quadratic.parameters(), self.prior.angle);
+        let t = &mut self.tools;
+        let fit = t.fitter.fit(&start, model.parameters(), &t.observations, STIFFER, &self.prior, 4)?;
+        let lock = Lock { surface: fit.surface, ..*lock };
+        let found = self.conclude(config, &fit.surface, &lock, model, bumpy.margin, Some(bumpy.labels))?;
+        let claimed = found.probability >= config.probability_threshold && found.evidence.bumps < WAVERS;
+        (claimed && found.evidence.comb_good >= bumpy.evidence.comb_good).then_some(found)
     }
 
     /// The sums of a lock-in over all of the picture at a sheet; returns their gain. Where the sheet is nearly the one of the last sums, those are turned by what the
