@@ -33,10 +33,10 @@ fn what_a_velocity_is_off_by_over_a_gap_is_not_taken_for_that_of_a_frame() {
 
 #[test]
 fn cells_are_counted_through_frames_without_a_pose() {
-    // The normal is too doubtful for a pose in every sixth frame, the lattice is not. With the count begun anew after each, twelve frames were flagged.
+    // The normal is too doubtful for a pose in every fifth frame, the lattice is not.
     let kind = KINDS.iter().position(|kind| *kind == "far").expect("a kind");
     let mut tally = Tally::default();
-    run(&sequence(kind, FRAMES, 8016), 1, &mut tally).expect("a simulated sequence");
+    run(&sequence(kind, FRAMES, 8008), 1, &mut tally).expect("a simulated sequence");
     assert!(tally.refused >= 3, "without gaps nothing is shown: {tally:?}");
     assert_eq!((tally.silent, tally.flagged), (0, 0), "{tally:?}");
 }
