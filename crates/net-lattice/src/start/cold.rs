@@ -57,6 +57,9 @@ const BUMPY_PASSES: usize = 2;
 /// 1.05 of fish.
 const UNLIKE: f64 = 1.2;
 
+/// Angle between the normals of two models of the same tiles, rad, from which they contradict each other: half of what an answer may be off.
+const CONTRADICTS: f64 = 0.0436;
+
 impl Workspace {
     pub(crate) fn cold(&mut self, config: &Config) -> Option<LatticeEstimate> {
         self.search();
@@ -110,17 +113,19 @@ impl Workspace {
         self.focus(&mut lock);
         let bumpy = self.over_bumps(&lock, false);
         let found = self.seated(config, bumpy.unwrap_or(lock), margin)?;
-        let refused = found.probability < config.probability_threshold;
-        if bumpy.is_none() && refused && found.evidence.bumps > WAVERS {
-            // What cannot be claimed for what scatters about it: with a relief, or as it is.
-            let stages = self.stages;
-            if let Some(bumpy) = self.over_bumps(&lock, true)
-                && let Some(found) = self.seated(config, bumpy, margin)
-            {
-                return Some(found);
-            }
-            self.stages = stages;
+        if bumpy.is_some() || found.evidence.bumps < WAVERS {
+            return Some(found);
         }
+        // What scatters about a polynomial is seen with a relief as well. It is that which counts where nothing can be claimed otherwise, and where the two contradict each other.
+        let stages = self.stages;
+        let other = self.over_bumps(&lock, true).and_then(|bumpy| self.seated(config, bumpy, margin));
+        let claimed = found.probability >= config.probability_threshold;
+        if let Some(other) = other
+            && !(claimed && other.pose.normal().angle(&found.pose.normal()) < CONTRADICTS)
+        {
+            return Some(other);
+        }
+        self.stages = stages;
         Some(found)
     }
 
