@@ -8,7 +8,8 @@ use crate::sheet::fit::Robust;
 use crate::sheet::model::Model;
 use crate::sheet::relief::Relief;
 use crate::sheet::surface::Surface;
-use crate::start::cold::{COLD, OUTWARDS};
+use crate::start::cold::COLD;
+use crate::start::outwards::OUTWARDS;
 use crate::workspace::{Lock, Workspace};
 
 /// How much better than with a polynomial tiles must agree with a relief. Of simulated flat nets that fish hide none agrees 1.18 times as well, of hung ones that only a

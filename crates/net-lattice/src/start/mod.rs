@@ -5,4 +5,5 @@ pub(crate) mod cold;
 pub(crate) mod conclude;
 pub(crate) mod follow;
 pub(crate) mod layers;
+pub(crate) mod outwards;
 pub(crate) mod periods;

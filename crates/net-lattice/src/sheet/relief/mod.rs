@@ -4,7 +4,10 @@
 //! bend for what lies elsewhere, as a polynomial's rim does, and where nothing is seen it has its prior's spread. Its value and slopes at the axis are taken off, so
 //! that depth and normal there are still the sheet's own. A net of unstretchable twine is laid out by two threads (a Chebyshev net); bumps make them stray.
 
-use net_geometry::nalgebra::SMatrix;
+mod prior;
+mod rows;
+
+pub(crate) use rows::Rows;
 
 /// Coefficients along each side of the grid.
 const SIDE: usize = 12;
@@ -16,8 +19,6 @@ pub(crate) const COEFFICIENTS: usize = GRID + 2 * SIDE;
 const GAPS: f64 = (SIDE - 3) as f64;
 /// Distance of coefficients over the correlation length.
 const SPACING: f64 = 0.8;
-/// Standard deviation of how far threads stray, m: bumps of the default height, seen from tangent planes turned by the default slope.
-const STRAY: f64 = 0.003;
 
 /// Coefficients between the axis and the middle of what is described, from which that is moved by one.
 const STRAYED: f64 = 2.0;
@@ -195,39 +196,6 @@ impl Relief {
         let [below, above] = [self.at(0.0, h), self.at(0.0, -h)];
         [right[1] - left[1], right[2] - left[2], below[2] - above[2]].map(|d| 0.5 * d / h)
     }
-
-    /// Adds the inverse covariance of the coefficients of fields with this deviation, m, and correlation length, m.
-    pub(crate) fn add_precision(&self, deviation: f64, length: f64, a: &mut [Row]) {
-        let (grid, threads) = (precision(self.spacing, length), precision(self.along, length));
-        let (of_grid, of_threads) = (deviation.powi(-2), STRAY.powi(-2));
-        for (k, row) in a.iter_mut().enumerate() {
-            if k < GRID {
-                for (l, a) in row[..GRID].iter_mut().enumerate() {
-                    *a += of_grid * grid[k / SIDE][l / SIDE] * grid[k % SIDE][l % SIDE];
-                }
-            } else {
-                let first = GRID + (k - GRID) / SIDE * SIDE;
-                for (a, p) in row[first..first + SIDE].iter_mut().zip(&threads[(k - GRID) % SIDE]) {
-                    *a += of_threads * p;
-                }
-            }
-        }
-    }
-}
-
-impl Relief {
-    /// How unlikely the bumps, and what the threads stray, are under the prior: sums of squares of as many standard deviations as are seen, some tens of the grid and some of the threads.
-    pub(crate) fn strain(&self, deviation: f64, length: f64) -> [f64; 2] {
-        let (grid, threads) = (precision(self.spacing, length), precision(self.along, length));
-        let bilinear = |p: &[[f64; SIDE]; SIDE], a: &[f64], b: &[f64]| -> f64 {
-            (0..SIDE).map(|i| a[i] * (0..SIDE).map(|j| p[i][j] * b[j]).sum::<f64>()).sum()
-        };
-        let row = |j: usize| &self.coefficients[j * SIDE..][..SIDE];
-        let rows = |j: usize| (0..SIDE).map(|k| grid[j][k] * bilinear(&grid, row(j), row(k))).sum::<f64>();
-        let bumps = (0..SIDE).map(rows).sum::<f64>();
-        let stray = [SIDE, SIDE + 1].map(|j| bilinear(&threads, row(j), row(j))).iter().sum::<f64>();
-        [bumps / deviation.powi(2), stray / STRAY.powi(2)]
-    }
 }
 
 /// Moves the coefficients along a line by one place, where the line begins a place earlier (a positive step) or later; what is new is as its neighbour.
@@ -240,96 +208,11 @@ fn roll(of: &mut Row, first: usize, stride: usize, step: f64) {
     }
 }
 
-/// Inverse covariance of coefficients so far apart, m, whose field has variance 1 and this correlation length, m.
-fn precision(spacing: f64, length: f64) -> [[f64; SIDE]; SIDE] {
-    /// A cubic B-spline's products with itself moved by so many gaps.
-    const B: [f64; 4] = [151.0 / 315.0, 397.0 / 1680.0, 1.0 / 42.0, 1.0 / 5040.0];
-    // A spline of correlated coefficients is correlated over both lengths; the spline's own is that of a Gaussian of variance 2/3.
-    let own = length * length - 2.0 / 3.0 * spacing * spacing;
-    let alike = |gaps: usize| match gaps {
-        0 => 1.0,
-        _ if own > 0.0 => (-0.5 * (gaps as f64 * spacing).powi(2) / own).exp(),
-        _ => 0.0,
-    };
-    let variance = B[0] + 2.0 * (1..4).map(|n| B[n] * alike(n)).sum::<f64>();
-    let covariance = SMatrix::<f64, SIDE, SIDE>::from_fn(|i, j| alike(i.abs_diff(j)) / variance);
-    let inverse = covariance.try_inverse().unwrap_or_else(SMatrix::identity);
-    std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)]))
-}
-
-/// Derivatives of both lattice coordinates by the coefficients, while they are summed up.
-pub(crate) struct Rows<'a> {
-    relief: &'a Relief,
-    rows: &'a mut [Row; 2],
-    /// What is to be taken off as the spline's value and slopes at the axis.
-    axis: [[f64; 3]; 2],
-}
-
-impl<'a> Rows<'a> {
-    pub(crate) fn new(relief: &'a Relief, rows: &'a mut [Row; 2]) -> Self {
-        Self { relief, rows, axis: [[0.0; 3]; 2] }
-    }
-
-    /// Adds of each coordinate `by` times the derivatives of the height at a place.
-    pub(crate) fn add_height(&mut self, x: f64, y: f64, by: [f64; 2]) {
-        let (column, row) = (self.relief.column(x), self.relief.row(y));
-        let weight = |i: usize, j: usize| column.value[i] * row.value[j];
-        self.add([row.first, column.first], by, weight);
-        for (axis, by) in self.axis.iter_mut().zip(by) {
-            axis.iter_mut().zip([1.0, x, y]).for_each(|(a, p)| *a += by * p);
-        }
-    }
-
-    /// The same of the slope along a way `(cx, cy)`.
-    pub(crate) fn add_slope(&mut self, x: f64, y: f64, [cx, cy]: [f64; 2], by: [f64; 2]) {
-        let (column, row) = (self.relief.column(x), self.relief.row(y));
-        let weight = |i: usize, j: usize| cx * column.slope[i] * row.value[j] + cy * column.value[i] * row.slope[j];
-        self.add([row.first, column.first], by, weight);
-        for (axis, by) in self.axis.iter_mut().zip(by) {
-            axis[1] += by * cx;
-            axis[2] += by * cy;
-        }
-    }
-
-    fn add(&mut self, first: [usize; 2], by: [f64; 2], weight: impl Fn(usize, usize) -> f64) {
-        for j in 0..4 {
-            let at = (first[0] + j) * SIDE + first[1];
-            for i in 0..4 {
-                let w = weight(i, j);
-                self.rows.iter_mut().zip(by).for_each(|(row, by)| row[at + i] += by * w);
-            }
-        }
-    }
-
-    /// The same of how far a family's thread strays where the other family's arc is `s`.
-    pub(crate) fn add_aside(&mut self, family: usize, s: f64, by: [f64; 2]) {
-        let (here, axis) = (self.relief.thread(family, s), self.relief.thread(family, 0.0));
-        let at = GRID + family * SIDE;
-        for (row, by) in self.rows.iter_mut().zip(by) {
-            for k in 0..4 {
-                row[at + here.first + k] += by * here.value[k];
-                row[at + axis.first + k] -= by * (axis.value[k] + axis.slope[k] * s);
-            }
-        }
-    }
-
-    /// Takes off what the axis keeps.
-    pub(crate) fn settle(mut self) {
-        let (column, row) = (self.relief.column(0.0), self.relief.row(0.0));
-        let first = [row.first, column.first];
-        for (f, [h, hx, hy]) in self.axis.into_iter().enumerate() {
-            let by = std::array::from_fn(|k| if k == f { -1.0 } else { 0.0 });
-            let (cv, cs, rv, rs) = (column.value, column.slope, row.value, row.slope);
-            self.add(first, by, |i, j| h * cv[i] * rv[j] + hx * cs[i] * rv[j] + hy * cv[i] * rs[j]);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn bumpy() -> Relief {
+    pub(super) fn bumpy() -> Relief {
         let steps: Row = std::array::from_fn(|k| 0.03 * f64::sin(1.7 * k as f64));
         Relief::level([-0.8, -0.7], [0.7, 0.8], 0.25).stepped(&steps, 1.0)
     }
@@ -341,31 +224,6 @@ mod tests {
             assert!(r.at(0.0, 0.0).into_iter().all(|v| v.abs() < 1e-15), "{:?}", r.at(0.0, 0.0));
             assert!(r.aside(0, 0.0).abs() < 1e-15 && (r.aside(1, 1e-6) - r.aside(1, -1e-6)).abs() < 1e-15);
         }
-    }
-
-    #[test]
-    fn slopes_are_those_of_the_heights_and_rows_those_of_the_coefficients() {
-        let r = bumpy();
-        for (x, y) in [(0.3, 0.2), (-0.6, 0.41), (0.01, -0.4), (2.0, 0.1)] {
-            let [h, hx, hy] = r.at(x, y);
-            let d = 1e-6;
-            // second derivatives are below 5 / m
-            assert!(((r.at(x + d, y)[0] - h) / d - hx).abs() < 1e-5 && ((r.at(x, y + d)[0] - h) / d - hy).abs() < 1e-5);
-            let mut rows = [[0.0; COEFFICIENTS]; 2];
-            let mut sums = Rows::new(&r, &mut rows);
-            sums.add_height(x, y, [2.0, -1.0]);
-            sums.add_slope(x, y, [0.5, -0.3], [1.0, 3.0]);
-            sums.add_aside(0, 0.4, [0.2, 0.7]);
-            sums.settle();
-            let by = |f: usize| rows[f].iter().zip(r.coefficients()).map(|(a, c)| a * c).sum::<f64>();
-            let slope = 0.5 * hx - 0.3 * hy;
-            assert!((by(0) - (2.0 * h + slope + 0.2 * r.aside(0, 0.4))).abs() < 1e-12);
-            assert!((by(1) - (-h + 3.0 * slope + 0.7 * r.aside(0, 0.4))).abs() < 1e-12);
-        }
-        let (d, [xx, xy, yy]) = (1e-4, r.curvature());
-        let (right, below) = (r.at(d, 0.0), r.at(0.0, d));
-        // third derivatives are below 50 / m^2
-        assert!([right[1] / d - xx, right[2] / d - xy, below[2] / d - yy].into_iter().all(|v| v.abs() < 1e-2));
     }
 
     #[test]
@@ -394,38 +252,6 @@ mod tests {
         for (x, y) in [(0.55, -0.3), (0.45, -0.15)] {
             let (a, b) = (height(&r, x, y), height(&moved, x - 1.2, y + 0.6));
             assert!((a - b).abs() < 1e-12, "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn the_prior_is_a_field_of_its_deviation_and_length() {
-        let (deviation, length) = (0.022, 0.36);
-        let r = Relief::level([-1.0, -1.0], [1.0, 1.0], length);
-        let mut a = vec![[0.0; COEFFICIENTS]; COEFFICIENTS];
-        r.add_precision(deviation, length, &mut a);
-        let precision = SMatrix::<f64, GRID, GRID>::from_fn(|i, j| a[i][j]);
-        let covariance = Box::new(precision).try_inverse().expect("positive definite");
-        let by = |x: f64, y: f64| {
-            let (column, row) = (r.column(x), r.row(y));
-            let mut w = [0.0; GRID];
-            for j in 0..4 {
-                (0..4).for_each(|i| w[(row.first + j) * SIDE + column.first + i] = column.value[i] * row.value[j]);
-            }
-            w
-        };
-        let between = |p: [f64; GRID], q: [f64; GRID]| {
-            (0..GRID).map(|i| p[i] * (0..GRID).map(|j| covariance[(i, j)] * q[j]).sum::<f64>()).sum::<f64>()
-        };
-        for (x, y) in [(0.0, 0.0), (0.31, -0.17), (-0.5, 0.44)] {
-            let here = by(x, y);
-            let own = between(here, here) / deviation.powi(2);
-            // A spline is not the same everywhere: a tenth of the variance between coefficients and on them.
-            assert!((own - 1.0).abs() < 0.1, "variance {own}");
-            for d in [0.5 * length, length, 1.5 * length] {
-                let alike = between(here, by(x + d, y)) / deviation.powi(2);
-                let gauss = (-0.5 * (d / length).powi(2)).exp();
-                assert!((alike - gauss).abs() < 0.1, "{alike} over {d} m, {gauss}");
-            }
         }
     }
 }
