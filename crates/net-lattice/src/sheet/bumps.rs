@@ -3,7 +3,7 @@
 use crate::numeric::Normal;
 use crate::sheet::chart::Point;
 use crate::sheet::fit::{Fit, Fitter, Observation, Prior, Robust, damped, sound};
-use crate::sheet::relief::{COEFFICIENTS, Row};
+use crate::sheet::relief::{COEFFICIENTS, Relief, Row};
 use crate::sheet::surface::{PARAMETERS, Params, SHAPE, Surface};
 use net_image::widely;
 
@@ -41,8 +41,8 @@ impl Bumps {
         self.clear();
     }
 
+    /// Equations of nothing yet.
     fn clear(&mut self) {
-        self.rows.clear();
         self.a.clear();
         self.a.resize(COEFFICIENTS, [0.0; COEFFICIENTS]);
         self.cross.clear();
@@ -128,14 +128,17 @@ impl Fitter {
         for _ in 0..iterations {
             self.linearize_quickly(&surface, PARAMETERS, observations);
             let n = self.normal(&surface, PARAMETERS, observations, robust, &fixed);
-            let (mut d, mut covariance) = self.eliminated(&surface, observations, robust, prior, Some(&before), &n)?;
+            self.relief_rows(&surface, observations);
+            let relief = surface.relief?;
+            let held = (prior.held, &before);
+            let (mut d, mut covariance) = self.eliminated(&relief, observations, robust, prior, held, &n)?;
             let damp = damped(&mut d);
-            let relief = surface.relief?.stepped(&self.bumps.b, damp);
+            let next = relief.stepped(&self.bumps.b, damp);
             if prior.held > 0.0 {
                 // What was held is no new evidence.
-                covariance = self.eliminated(&surface, observations, robust, prior, None, &n)?.1;
+                covariance = self.eliminated(&relief, observations, robust, prior, (0.0, &before), &n)?.1;
             }
-            surface = Surface { relief: Some(relief), ..surface.stepped(&d) };
+            surface = Surface { relief: Some(next), ..surface.stepped(&d) };
             if !sound(&surface, prior) {
                 return None;
             }
@@ -151,58 +154,49 @@ impl Fitter {
         fit
     }
 
-    /// Step of the parameters, and their covariance, with the coefficients eliminated, whose step is left in `bumps.b`. `before`: coefficients that are held to.
-    fn eliminated(
-        &mut self,
-        surface: &Surface,
-        observations: &[Observation],
-        robust: Robust,
-        prior: &Prior,
-        before: Option<&Row>,
-        n: &Normal<PARAMETERS>,
-    ) -> Option<(Params, [[f64; PARAMETERS]; PARAMETERS])> {
-        self.add_bumps(surface, observations, robust, prior, before)?;
-        let mut left = n.clone();
-        self.bumps.eliminate()?;
-        self.bumps.reduce(&mut left);
-        let (d, covariance) = left.solve(PARAMETERS)?;
-        self.bumps.substitute(&d);
-        Some((d, covariance))
-    }
-
-    /// Normal equations of the coefficients at the last linearization.
-    fn add_bumps(
-        &mut self,
-        surface: &Surface,
-        observations: &[Observation],
-        robust: Robust,
-        prior: &Prior,
-        before: Option<&Row>,
-    ) -> Option<()> {
-        let relief = surface.relief.as_ref()?;
+    /// Derivatives by the coefficients at the last linearization.
+    fn relief_rows(&mut self, surface: &Surface, observations: &[Observation]) {
         let chart = surface.chart();
-        let mut bumps = std::mem::take(&mut self.bumps);
-        bumps.clear();
-        let [deviation, length] = prior.bumps;
-        relief.add_precision(deviation, length, &mut bumps.a);
-        let held = before.map_or(0.0, |_| prior.held);
-        let c = relief.coefficients();
-        let off: Row = std::array::from_fn(|k| (1.0 + held) * c[k] - held * before.map_or(0.0, |before| before[k]));
-        for (row, b) in bumps.a.iter_mut().zip(&mut bumps.b) {
-            *b = -row.iter().zip(&off).map(|(a, c)| a * c).sum::<f64>();
-            row.iter_mut().for_each(|a| *a *= 1.0 + held);
-        }
+        self.bumps.rows.clear();
         for ((o, r), depth) in observations.iter().zip(&self.residuals).zip(&self.depth) {
             let mut rows = [[0.0; COEFFICIENTS]; 2];
             if !r[0].is_nan() {
                 let point = Point { s: [o.s[0] - r[0], o.s[1] - r[1]], depth: *depth };
                 chart.relief_slopes(o.site.ray, &point, &mut rows);
             }
-            bumps.rows.push(rows);
+            self.bumps.rows.push(rows);
+        }
+    }
+
+    /// Step of the parameters, and their covariance, with the coefficients eliminated, whose step is left in `bumps.b`. `held`: how many times as much as the prior, and which
+    /// coefficients.
+    fn eliminated(
+        &mut self,
+        relief: &Relief,
+        observations: &[Observation],
+        robust: Robust,
+        prior: &Prior,
+        (held, before): (f64, &Row),
+        n: &Normal<PARAMETERS>,
+    ) -> Option<(Params, [[f64; PARAMETERS]; PARAMETERS])> {
+        let mut bumps = std::mem::take(&mut self.bumps);
+        bumps.clear();
+        let [deviation, length] = prior.bumps;
+        relief.add_precision(deviation, length, &mut bumps.a);
+        let c = relief.coefficients();
+        let off: Row = std::array::from_fn(|k| (1.0 + held) * c[k] - held * before[k]);
+        for (row, b) in bumps.a.iter_mut().zip(&mut bumps.b) {
+            *b = -row.iter().zip(&off).map(|(a, c)| a * c).sum::<f64>();
+            row.iter_mut().for_each(|a| *a *= 1.0 + held);
         }
         add_products(self, observations, robust, &mut bumps);
         self.bumps = bumps;
-        Some(())
+        let mut left = n.clone();
+        self.bumps.eliminate()?;
+        self.bumps.reduce(&mut left);
+        let (d, covariance) = left.solve(PARAMETERS)?;
+        self.bumps.substitute(&d);
+        Some((d, covariance))
     }
 }
 
@@ -241,7 +235,6 @@ mod tests {
 
     use super::*;
     use crate::picture::view::Site;
-    use crate::sheet::relief::Relief;
 
     /// A sheet that rises and falls by some centimetres over a view 1.4 m wide, and its threads by a millimetre or two.
     fn bumpy() -> Surface {

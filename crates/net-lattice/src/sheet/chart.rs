@@ -54,6 +54,20 @@ pub(crate) struct Point {
     pub depth: f64,
 }
 
+/// Where a ray meets the sheet.
+struct Meeting {
+    /// The ray along both axes of the tangent plane, per depth.
+    along: [f64; 2],
+    /// Place in the tangent plane, m, and the sheet's slope there.
+    at: [f64; 2],
+    slope: [f64; 2],
+    /// Lattice coordinates, cells, a step, m, further along x, and along y.
+    step: f64,
+    beside: [[f64; 2]; 2],
+    /// How much farther along the ray, in depth, the sheet is met that is higher by so much.
+    farther: f64,
+}
+
 /// Three-point Gauss: places of [0, 1] and their weights.
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
@@ -197,20 +211,27 @@ impl Chart {
         Some(Point { s: self.lattice(a1 * depth - b1, a2 * depth - b2), depth })
     }
 
+    /// Where a ray meets the sheet at this depth, m, and what its derivatives are made of.
+    fn meeting(&self, ray: [f64; 2], depth: f64) -> Meeting {
+        let d = [ray[0], ray[1], 1.0];
+        let along = |axis: &[f64; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
+        let (a1, a2, z) = (along(&self.e1), along(&self.e2), self.z);
+        let (x, y) = (a1 * depth - self.e1[2] * z, a2 * depth - self.e2[2] * z);
+        let (hx, hy) = self.slope(x, y);
+        let step = 1e-6 * depth;
+        let beside = [self.lattice(x + step, y), self.lattice(x, y + step)];
+        let farther = 1.0 / (along(&self.n) - hx * a1 - hy * a2);
+        Meeting { along: [a1, a2], at: [x, y], slope: [hx, hy], step, beside, farther }
+    }
+
     /// Derivatives of the coordinates of a point that a ray meets by all parameters, in their order. `wider`: the same sheet with its crossing angle larger by
     /// `step`.
     pub(crate) fn slopes(&self, ray: [f64; 2], point: &Point, wider: &Self, step: f64) -> [Params; 2] {
-        let d = [ray[0], ray[1], 1.0];
-        let along = |axis: &[f64; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
-        let (a1, a2, depth, z) = (along(&self.e1), along(&self.e2), point.depth, self.z);
-        let (x, y) = (a1 * depth - self.e1[2] * z, a2 * depth - self.e2[2] * z);
-        let (hx, hy) = self.slope(x, y);
+        let (d, depth, z) = ([ray[0], ray[1], 1.0], point.depth, self.z);
+        let Meeting { along: [a1, a2], at: [x, y], slope: [hx, hy], step: h, beside: [right, below], farther } =
+            self.meeting(ray, depth);
         // Coordinates by the place in the tangent plane.
-        let h = 1e-6 * depth;
-        let (right, below) = (self.lattice(x + h, y), self.lattice(x, y + h));
         let by_place: [[f64; 2]; 2] = std::array::from_fn(|f| [right, below].map(|s| (s[f] - point.s[f]) / h));
-        // Higher by so much, the sheet is met so much farther along the ray.
-        let farther = 1.0 / (along(&self.n) - hx * a1 - hy * a2);
         let mut out = [[0.0; PARAMETERS]; 2];
         let mut set = |k: usize, rise: f64, dx: f64, dy: f64| {
             // Both lie in the tangent plane; the sheet is higher there than the point by `rise`.
@@ -283,14 +304,8 @@ impl Chart {
     /// Derivatives of the coordinates of a point that a ray meets by the relief's coefficients, into `rows`, which are zero.
     pub(crate) fn relief_slopes(&self, ray: [f64; 2], point: &Point, rows: &mut [Row; 2]) {
         let Some(relief) = &self.relief else { return };
-        let d = [ray[0], ray[1], 1.0];
-        let along = |axis: &[f64; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
-        let (a1, a2, depth, z) = (along(&self.e1), along(&self.e2), point.depth, self.z);
-        let (x, y) = (a1 * depth - self.e1[2] * z, a2 * depth - self.e2[2] * z);
-        let (hx, hy) = self.slope(x, y);
-        let h = 1e-6 * depth;
-        let (right, below) = (self.lattice(x + h, y), self.lattice(x, y + h));
-        let farther = 1.0 / (along(&self.n) - hx * a1 - hy * a2);
+        let Meeting { along: [a1, a2], at: [x, y], step: h, beside: [right, below], farther, .. } =
+            self.meeting(ray, point.depth);
         let by = std::array::from_fn(|f| ((right[f] - point.s[f]) * a1 + (below[f] - point.s[f]) * a2) / h * farther);
         let mut rows = Rows::new(relief, rows);
         // Higher, the point is met farther along the ray, ..
