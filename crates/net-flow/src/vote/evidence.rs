@@ -5,6 +5,10 @@ use super::{LISTED, ShiftScore, Verdict, VoteConfig, VoteResult};
 /// What a frame says of a shift for which it had too few common cells, deviations: against it.
 const UNSEEN: f64 = -3.0;
 
+/// How far the best shift must stand out from a second that is beyond chance itself. Chance does not add up over frames: then something in the pictures repeats with other steps than the
+/// net's, as another net behind does, and the best may be one of its.
+const REPEATING_RATIO: f64 = 2.0;
+
 /// Sums over undecided frames. Owns its buffers.
 #[derive(Debug)]
 pub(super) struct Evidence {
@@ -64,7 +68,8 @@ impl Evidence {
             }
         }
         let (first, second) = (best[0].z, best[1].z);
-        let decided = first > self.min_z && first > self.min_ratio * second;
+        let ratio = if second > self.min_z { self.min_ratio.max(REPEATING_RATIO) } else { self.min_ratio };
+        let decided = first > self.min_z && first > ratio * second;
         VoteResult {
             verdict: if decided { Verdict::Decided } else { Verdict::Ambiguous },
             frames: count as u32,
@@ -73,5 +78,34 @@ impl Evidence {
             log_odds: (first.max(0.0).powi(2) - second.max(0.0).powi(2)) / 2.0,
             compared,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deviations of a look: `best` for no shift, `second` for one, nothing for the others.
+    fn look(shifts: usize, best: f64, second: f64) -> Vec<Option<f64>> {
+        let mut z = vec![Some(0.0); shifts];
+        (z[shifts / 2], z[shifts / 2 + 1]) = (Some(best), Some(second));
+        z
+    }
+
+    #[test]
+    fn what_repeats_with_other_steps_must_be_outdone_twice() {
+        let config = VoteConfig::default();
+        let after = |best: f64, second: f64, looks: usize| {
+            let mut evidence = Evidence::new(&config);
+            let z = look(evidence.shifts, best, second);
+            (0..looks).map(|_| evidence.add(&z, 200)).last().expect("a look at least").verdict
+        };
+        // A second as high as chance makes it.
+        assert_eq!(after(5.2, 3.3, 1), Verdict::Decided);
+        // Seven looks at a net with another behind it, whose aliases grow along: 11.3 to 7.4, and the best was one of them.
+        let (best, second) = (11.3 / 7f64.sqrt(), 7.37 / 7f64.sqrt());
+        assert_eq!(after(best, second, 1), Verdict::Ambiguous);
+        assert_eq!(after(best, second, 7), Verdict::Ambiguous);
+        assert_eq!(after(best, 0.45 * best, 7), Verdict::Decided);
     }
 }
