@@ -83,7 +83,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, name: &str, truth: &Truth, found: Option<&LatticeEstimate>, ms: u128) {
+    fn add(&mut self, name: &str, camera: &Camera, truth: &Truth, found: Option<&LatticeEstimate>, ms: u128) {
         let ok = found.is_some_and(|e| e.probability >= Config::default().probability_threshold);
         let net = truth.layers.first();
         let errors = net.zip(found).and_then(|(net, e)| Errors::new(net, e));
@@ -112,7 +112,9 @@ impl Tally {
         {
             let tilt = axis.normal.z.clamp(-1.0, 1.0).acos().to_degrees();
             let snr = net.contrast_grey.abs() / truth.noise_grey.max(1e-9);
-            line += &format!(" true {:.3} m tilt {tilt:.0} snr {snr:.1}", axis.range_m);
+            // The mesh's shorter side as it would be seen head-on at that range.
+            let cell = net.mesh.side1().min(net.mesh.side2()) * camera.fx() / axis.range_m;
+            line += &format!(" true {:.3} m tilt {tilt:.0} cell {cell:.0} px snr {snr:.1}", axis.range_m);
         }
         if let Some(e) = found {
             line += &format!(" p {:.3} z {:.3}", e.probability, e.range);
@@ -168,7 +170,7 @@ fn one(scenario: &Scenario, k: u32, kept: &mut Option<(Camera, Mesh, LatticeEsti
     let started = Instant::now();
     let found = estimator.estimate(view).ok().flatten();
     let name = if scenario.frames > 1 { format!("{} {k}", scenario.name) } else { scenario.name.clone() };
-    tally.add(&name, truth, found.as_ref(), started.elapsed().as_millis());
+    tally.add(&name, &camera, truth, found.as_ref(), started.elapsed().as_millis());
 }
 
 fn main() {
