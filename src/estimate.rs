@@ -1,5 +1,6 @@
+use net_flow::vote::VoteResult;
 use net_geometry::nalgebra::{Matrix6, Vector3};
-use net_geometry::{Junction, Mesh, Pose};
+use net_geometry::{Junction, Mesh, Plane, Pose};
 use net_junction::Twine;
 
 /// Whether there is a net, and a pose that can be relied on.
@@ -90,10 +91,17 @@ impl NetPose {
 pub struct Sheet {
     /// Angle from X to the second mesh direction, rad.
     pub crossing_angle: f64,
-    /// One standard deviation of it, rad; zero when it was held fixed.
-    pub sigma_crossing_angle: f64,
+    /// One standard deviation of it, rad; `None` when it was held at the mesh's own.
+    pub sigma_crossing_angle: Option<f64>,
     /// Principal curvatures, 1/m, larger magnitude first; positive bends away from the camera.
     pub curvatures_per_m: [f64; 2],
+    /// One standard deviation of each, 1/m; `None` when the sheet was held flat.
+    pub sigma_curvatures_per_m: Option<[f64; 2]>,
+    /// The plane through what is seen of the net about the optical axis, camera frame. [`NetPose::pose`] tells of the tangent plane on the axis.
+    pub mean_plane: Plane,
+    /// How much worse a drawing with the best of other cells (halves, doubles, thirds, sides swapped) explains the picture, as a share of what this one explains; in [-1, 1], negative where the
+    /// other is better. A followed net has that of its first picture.
+    pub cell_margin: f64,
 }
 
 /// One of several nets in a picture.
@@ -126,6 +134,9 @@ pub struct Estimate<'a> {
     pub corrected: (i32, i32),
     /// Which frame of a doubt this is, from 1; 0 without. The one that settles it, the n-th, explains those before: the k-th was named with k n-ths of its `corrected` too little.
     pub in_doubt: u32,
+    /// What does not repeat in the picture said of the cells: the likeliest shifts *per frame* of the names that this frame came with (those before [`Estimate::corrected`]), by how many
+    /// deviations each stands out, and the odds of the best to the second. `None` where there was nothing to compare with, and from methods that do not count.
+    pub vote: Option<VoteResult>,
     /// Junctions found in this frame.
     pub junctions: &'a [Junction],
     /// Twines between neighbouring nodes in view, with the evidence for and against each; from [`crate::Method::Lattice`].

@@ -15,6 +15,7 @@ mod tracker;
 pub use config::{Config, Method};
 pub use error::{Error, Result};
 pub use estimate::{Connection, Estimate, Layer, NetPose, Sheet, Status};
+pub use net_flow::vote::{ShiftScore, Verdict, VoteResult};
 pub use net_geometry::{Camera, Junction, JunctionState, Lens, Mesh, Plane, Pose};
 pub use net_image::GrayView;
 pub use net_junction::{Twine, TwineState};

@@ -100,6 +100,7 @@ impl Tracker {
         let (probability, track) = found.map_or((0.0, 0), |f| (f.probability, f.track));
         let connection = found.map_or(Connection::Followed, |f| f.connection);
         let (corrected, in_doubt) = found.map_or(((0, 0), 0), |f| (f.corrected, f.in_doubt));
+        let vote = found.and_then(|f| f.vote);
         let net = found.filter(|f| f.probability >= self.threshold).map(|f| f.net);
         self.posed = net.is_some();
         let status = if self.posed { Status::Ok } else { Status::NoNet };
@@ -118,7 +119,19 @@ impl Tracker {
             _ => &[],
         };
         let (junctions, layers) = (&self.junctions, &self.layers);
-        Ok(Estimate { status, probability, net, track, connection, corrected, in_doubt, junctions, twines, layers })
+        Ok(Estimate {
+            status,
+            probability,
+            net,
+            track,
+            connection,
+            corrected,
+            in_doubt,
+            vote,
+            junctions,
+            twines,
+            layers,
+        })
     }
 
     /// Where a point of the lattice (fractions included) is in the last frame: its pixel, lens distortion included, and its depth along the optical axis, m. On the sheet as

@@ -20,10 +20,17 @@ pub struct Estimate {
     track: u32,
     #[pyo3(get)]
     connection: &'static str,
+    /// Likeliest shifts and what they stand out by, and the logarithm of the odds of the first to the second.
+    shifts: Vec<Shift>,
+    #[pyo3(get)]
+    log_odds: Option<f64>,
     net: Option<netpose::NetPose>,
     junctions: Vec<netpose::Junction>,
     layers: Vec<netpose::Layer>,
 }
+
+/// Cells along both directions, and deviations.
+type Shift = (i32, i32, f64);
 
 /// One of several nets in a picture.
 #[pyclass(frozen, module = "netpose_rs")]
@@ -68,6 +75,46 @@ impl Layer {
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrix(py, 6, |r, c| self.inner.net.covariance[(r, c)])
     }
+    #[getter]
+    fn sigma_range_m(&self) -> f64 {
+        self.inner.net.sigma_range_m
+    }
+    #[getter]
+    fn sigma_tilt(&self) -> f64 {
+        self.inner.net.sigma_tilt
+    }
+    #[getter]
+    fn sigma_xy_m(&self) -> f64 {
+        self.inner.net.sigma_xy_m
+    }
+    #[getter]
+    fn crossing_angle(&self) -> Option<f64> {
+        self.inner.net.sheet.map(|s| s.crossing_angle)
+    }
+    #[getter]
+    fn sigma_crossing_angle(&self) -> Option<f64> {
+        self.inner.net.sheet.and_then(|s| s.sigma_crossing_angle)
+    }
+    #[getter]
+    fn curvatures_per_m(&self) -> Option<(f64, f64)> {
+        self.inner.net.sheet.map(|s| s.curvatures_per_m.into())
+    }
+    #[getter]
+    fn sigma_curvatures_per_m(&self) -> Option<(f64, f64)> {
+        self.inner.net.sheet.and_then(|s| s.sigma_curvatures_per_m).map(Into::into)
+    }
+    #[getter]
+    fn mean_normal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.net.sheet.map(|s| s.mean_plane.normal.as_slice().to_pyarray(py))
+    }
+    #[getter]
+    fn mean_distance_m(&self) -> Option<f64> {
+        self.inner.net.sheet.map(|s| s.mean_plane.distance)
+    }
+    #[getter]
+    fn cell_margin(&self) -> Option<f64> {
+        self.inner.net.sheet.map(|s| s.cell_margin)
+    }
     fn __repr__(&self) -> String {
         let Layer { inner } = self;
         let followed = if inner.followed { "True" } else { "False" };
@@ -76,7 +123,8 @@ impl Layer {
 }
 
 /// What [`Estimate`] holds, in the order of its fields.
-type EstimateState = (String, f64, u32, String, Option<Vec<f64>>, Vec<JunctionNumbers>, Vec<LayerNumbers>);
+type EstimateState =
+    (String, f64, u32, String, Vec<Shift>, Option<f64>, Option<Vec<f64>>, Vec<JunctionNumbers>, Vec<LayerNumbers>);
 
 impl Estimate {
     /// Copies what must outlive the frame.
@@ -86,10 +134,18 @@ impl Estimate {
             probability: estimate.probability,
             track: estimate.track,
             connection: estimate.connection.as_str(),
+            shifts: estimate.vote.map_or_else(Vec::new, |vote| {
+                vote.shifts.iter().map(|shift| (shift.cells.0, shift.cells.1, shift.z)).collect()
+            }),
+            log_odds: estimate.vote.map(|vote| vote.log_odds),
             net: estimate.net,
             junctions: estimate.junctions.to_vec(),
             layers: estimate.layers.to_vec(),
         }
+    }
+
+    fn sheet(&self) -> Option<netpose::Sheet> {
+        self.net?.sheet
     }
 }
 
@@ -101,6 +157,8 @@ impl Estimate {
             self.probability,
             self.track,
             self.connection.to_owned(),
+            self.shifts.clone(),
+            self.log_odds,
             self.net.as_ref().map(from_net),
             self.junctions.iter().map(from_junction).collect(),
             self.layers.iter().map(from_layer).collect(),
@@ -109,12 +167,14 @@ impl Estimate {
     }
     #[staticmethod]
     fn _from_state(state: EstimateState) -> PyResult<Self> {
-        let (status, probability, track, connection, net, junctions, layers) = state;
+        let (status, probability, track, connection, shifts, log_odds, net, junctions, layers) = state;
         Ok(Self {
             status: to_status(&status)?,
             probability,
             track,
             connection: to_connection(&connection)?,
+            shifts,
+            log_odds,
             net: net.as_deref().map(to_net).transpose()?,
             junctions: junctions.into_iter().map(to_junction).collect::<PyResult<_>>()?,
             layers: layers.iter().map(to_layer).collect::<PyResult<_>>()?,
@@ -151,6 +211,18 @@ impl Estimate {
         array2(py, rows, self.junctions.len(), 2)
     }
     #[getter]
+    fn sigma_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.junctions.iter().map(|j| j.sigma_px).collect::<Vec<_>>().to_pyarray(py)
+    }
+    #[getter]
+    fn states(&self) -> Vec<&'static str> {
+        self.junctions.iter().map(|j| j.state.as_str()).collect()
+    }
+    #[getter]
+    fn shifts(&self) -> Vec<Shift> {
+        self.shifts.clone()
+    }
+    #[getter]
     fn layers(&self) -> Vec<Layer> {
         self.layers.iter().map(|&inner| Layer { inner }).collect()
     }
@@ -168,11 +240,31 @@ impl Estimate {
     }
     #[getter]
     fn crossing_angle(&self) -> Option<f64> {
-        self.net?.sheet.map(|s| s.crossing_angle)
+        self.sheet().map(|s| s.crossing_angle)
+    }
+    #[getter]
+    fn sigma_crossing_angle(&self) -> Option<f64> {
+        self.sheet().and_then(|s| s.sigma_crossing_angle)
     }
     #[getter]
     fn curvatures_per_m(&self) -> Option<(f64, f64)> {
-        self.net?.sheet.map(|s| s.curvatures_per_m.into())
+        self.sheet().map(|s| s.curvatures_per_m.into())
+    }
+    #[getter]
+    fn sigma_curvatures_per_m(&self) -> Option<(f64, f64)> {
+        self.sheet().and_then(|s| s.sigma_curvatures_per_m).map(Into::into)
+    }
+    #[getter]
+    fn mean_normal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.sheet().map(|s| s.mean_plane.normal.as_slice().to_pyarray(py))
+    }
+    #[getter]
+    fn mean_distance_m(&self) -> Option<f64> {
+        self.sheet().map(|s| s.mean_plane.distance)
+    }
+    #[getter]
+    fn cell_margin(&self) -> Option<f64> {
+        self.sheet().map(|s| s.cell_margin)
     }
     fn __repr__(&self) -> String {
         match self.net {

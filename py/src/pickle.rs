@@ -1,7 +1,7 @@
 //! Estimates as plain numbers and words, and back: what `pickle` and `copy` carry from process to process.
 
 use net_geometry::nalgebra::{Matrix3, Matrix6, Rotation3, Vector2, Vector3};
-use net_geometry::{Junction, JunctionState, Pose};
+use net_geometry::{Junction, JunctionState, Plane, Pose};
 use netpose::{Connection, Layer, NetPose, Sheet, Status};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,8 +13,8 @@ pub type LayerNumbers = (Vec<f64>, f64, bool);
 
 /// Rotation and translation, covariance, range, distance, normal and sigmas, in their order in [`NetPose`].
 const WITHOUT_SHEET: usize = 9 + 3 + 36 + 2 + 3 + 3;
-/// The same, and the four numbers of the sheet behind them.
-const WITH_SHEET: usize = WITHOUT_SHEET + 4;
+/// The same, and the numbers of the sheet behind them; NaN for what was held.
+const WITH_SHEET: usize = WITHOUT_SHEET + 11;
 
 /// A net's pose as numbers.
 pub fn from_net(net: &NetPose) -> Vec<f64> {
@@ -26,8 +26,11 @@ pub fn from_net(net: &NetPose) -> Vec<f64> {
     numbers.extend(net.normal.iter());
     numbers.extend([net.sigma_range_m, net.sigma_tilt, net.sigma_xy_m]);
     if let Some(sheet) = &net.sheet {
-        numbers.extend([sheet.crossing_angle, sheet.sigma_crossing_angle]);
+        numbers.extend([sheet.crossing_angle, sheet.sigma_crossing_angle.unwrap_or(f64::NAN)]);
         numbers.extend(sheet.curvatures_per_m);
+        numbers.extend(sheet.sigma_curvatures_per_m.unwrap_or([f64::NAN; 2]));
+        numbers.extend(sheet.mean_plane.normal.iter());
+        numbers.extend([sheet.mean_plane.distance, sheet.cell_margin]);
     }
     numbers
 }
@@ -51,8 +54,11 @@ pub fn to_net(numbers: &[f64]) -> PyResult<NetPose> {
     let (sigma_range_m, sigma_tilt, sigma_xy_m) = (take(1)[0], take(1)[0], take(1)[0]);
     let sheet = (numbers.len() == WITH_SHEET).then(|| Sheet {
         crossing_angle: take(1)[0],
-        sigma_crossing_angle: take(1)[0],
+        sigma_crossing_angle: Some(take(1)[0]).filter(|sigma| !sigma.is_nan()),
         curvatures_per_m: [take(1)[0], take(1)[0]],
+        sigma_curvatures_per_m: Some([take(1)[0], take(1)[0]]).filter(|[sigma, _]| !sigma.is_nan()),
+        mean_plane: Plane { normal: Vector3::from_column_slice(take(3)), distance: take(1)[0] },
+        cell_margin: take(1)[0],
     });
     Ok(NetPose { pose, covariance, range_m, distance_m, normal, sigma_range_m, sigma_tilt, sigma_xy_m, sheet })
 }

@@ -36,10 +36,17 @@ def test_grey_water_is_no_net(grey: int) -> None:
         result.sigma_tilt,
         result.sigma_xy_m,
         result.crossing_angle,
+        result.sigma_crossing_angle,
         result.curvatures_per_m,
+        result.sigma_curvatures_per_m,
+        result.mean_normal,
+        result.mean_distance_m,
+        result.cell_margin,
+        result.log_odds,
     ):
         assert value is None
     assert result.junctions.shape == (0, 2) and result.lattice.shape == (0, 2)
+    assert result.sigma_px.shape == (0,) and result.states == [] and result.shifts == []
     assert result.junctions.dtype == np.float64 and result.lattice.dtype == np.int64
     assert "no_net" in repr(result)
 

@@ -89,6 +89,39 @@ def test_junctions_are_the_knots_by_name(plain: npr.sim.SimFrame, result: npr.Es
     assert abs(np.linalg.det(named[:2])) == pytest.approx(1)
 
 
+def test_a_flat_square_net_is_held_flat_and_square(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
+    assert result.crossing_angle == pytest.approx(np.pi / 2) and result.sigma_crossing_angle is None
+    assert result.curvatures_per_m == (0.0, 0.0) and result.sigma_curvatures_per_m is None
+    assert result.mean_normal == pytest.approx(result.normal) and result.mean_distance_m == pytest.approx(result.distance_m)
+    # Twice and half the mesh explain next to nothing of a clean picture.
+    assert result.cell_margin is not None and 0.3 < result.cell_margin <= 1.0
+
+
+def test_a_hung_net_has_angle_and_curvatures_with_sigmas() -> None:
+    frame = npr.sim.render("hung")
+    result = npr.estimate(frame.image, frame.camera, frame.mesh)
+    assert result.status == "ok" and frame.crossing_angle is not None and frame.curvatures_per_m is not None
+    assert result.crossing_angle is not None and result.sigma_crossing_angle is not None
+    assert result.curvatures_per_m is not None and result.sigma_curvatures_per_m is not None
+    # Four deviations: one picture.
+    assert abs(result.crossing_angle - frame.crossing_angle) < 4 * result.sigma_crossing_angle
+    for found, true, sigma in zip(
+        result.curvatures_per_m, frame.curvatures_per_m, result.sigma_curvatures_per_m, strict=True
+    ):
+        assert 0 < sigma < 0.3 and abs(found - true) < 4 * sigma
+    assert result.normal is not None and result.mean_normal is not None
+    assert 0 < np.degrees(np.arccos(float(result.normal @ result.mean_normal))) < 10
+
+
+def test_junctions_have_sigmas_and_states(plain: npr.sim.SimFrame, result: npr.Estimate) -> None:
+    assert len(result.states) == len(result.junctions) == len(result.sigma_px)
+    assert set(result.states) == {"seen"}
+    nearest = np.linalg.norm(result.junctions[:, None] - plain.nodes[None], axis=2).min(axis=1)
+    # Root mean square over both axes of some hundred knots: what is said is within a factor of two and a half.
+    rms = np.sqrt(np.mean((nearest / result.sigma_px) ** 2) / 2)
+    assert 0.4 < rms < 2.5
+
+
 def test_the_thesis_method_is_there_too(plain: npr.sim.SimFrame) -> None:
     result = npr.estimate(plain.image, plain.camera, plain.mesh, method="thesis")
     # 5 % is what its tables reach; it may refuse.
@@ -103,6 +136,12 @@ def test_a_tracker_counts_cells() -> None:
     results = [tracker.update(f.image, f.timestamp_ns) for f in frames]
     assert [r.status for r in results] == ["ok"] * 4
     assert len({r.track for r in results}) == 1
+    # What the vote said of each frame but the first: the same cells as predicted, by far.
+    assert results[0].shifts == [] and results[0].log_odds is None
+    for r in results[1:]:
+        (i, j, z), (_, _, second) = r.shifts[:2]
+        assert r.log_odds is not None and r.log_odds > 5 and z > 1.5 * second
+        assert r.connection == "followed" and (i, j) == (0, 0) or r is results[1]
     first, last = results[0].pose, results[-1].pose
     true_first, true_last = frames[0].pose, frames[-1].pose
     assert first is not None and last is not None and true_first is not None and true_last is not None

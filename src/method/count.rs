@@ -29,7 +29,7 @@ const LOOK_UP_EVERY: u32 = 4;
 const REFUTING_Z: f64 = 8.0;
 
 /// What the count says of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Counted {
     /// To be added to the names that it came with.
     pub cells: (i32, i32),
@@ -40,6 +40,8 @@ pub(super) struct Counted {
     pub in_doubt: u32,
     /// Whether the vote was certain.
     pub proven: bool,
+    /// What it said, of the names that the frame came with.
+    pub vote: Option<VoteResult>,
 }
 
 /// The map of the count before, for a place that may be recognised.
@@ -112,11 +114,12 @@ impl CellCount {
         }
         let vote = self.vote.update_flat(picture, middle, pixel_from_lattice);
         let refuted = weakly_refuted(&vote, naming);
-        let counted = if let Some(other) = refuted {
+        let mut counted = if let Some(other) = refuted {
             self.begin_as_named(other)
         } else {
             Counted { proven: vote.verdict == Verdict::Decided, ..self.judge(&vote, middle, naming, gapless) }
         };
+        counted.vote = matches!(vote.verdict, Verdict::Decided | Verdict::Ambiguous).then_some(vote);
         // Frames in doubt have no place in the map, nor has one of which the vote and a velocity say different things.
         let certain = self.doubt.is_none() && refuted.is_none();
         if certain && (counted.proven || counted.connection != Connection::Followed) {
@@ -271,7 +274,7 @@ fn weakly_refuted(vote: &VoteResult, naming: Naming) -> Option<(i32, i32)> {
 }
 
 fn told(cells: (i32, i32), connection: Connection) -> Counted {
-    Counted { cells, cells_before: (0, 0), connection, in_doubt: 0, proven: false }
+    Counted { cells, cells_before: (0, 0), connection, in_doubt: 0, proven: false, vote: None }
 }
 
 fn plus(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {

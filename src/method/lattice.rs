@@ -171,12 +171,13 @@ impl LatticeMethod {
         };
         let vouched = estimate.probability >= self.threshold;
         let known = estimate.evidence.lattice_probability() >= self.threshold;
-        let (mut connection, mut cells, mut in_doubt) = (Connection::Followed, (0, 0), 0);
+        let (mut connection, mut cells, mut in_doubt, mut vote) = (Connection::Followed, (0, 0), 0, None);
         if known {
             self.list_junctions(image, &estimate, junctions)?;
             let counted = self.count_cells(&estimate, naming, junctions);
             estimate = estimate.renumbered(counted.cells);
             (connection, cells, in_doubt) = (counted.connection, counted.cells, counted.in_doubt);
+            vote = counted.vote;
             self.motion.observe(timestamp_ns, &estimate.pose);
             self.estimator.follow_on(&estimate);
         }
@@ -194,7 +195,7 @@ impl LatticeMethod {
         }
         let carried_on = matches!(connection, Connection::Followed | Connection::Settled);
         let corrected = if carried_on { cells } else { (0, 0) };
-        Ok(Some(Found { net, probability, track, connection, corrected, in_doubt }))
+        Ok(Some(Found { net, probability, track, connection, corrected, in_doubt, vote }))
     }
 
     /// How the count goes on to this pose from the one before, whatever happened in between.
@@ -385,6 +386,9 @@ fn net_pose(e: &LatticeEstimate) -> NetPose {
             crossing_angle: e.crossing_angle,
             sigma_crossing_angle: e.crossing_angle_sigma,
             curvatures_per_m: e.curvatures,
+            sigma_curvatures_per_m: e.curvature_sigmas,
+            mean_plane: e.mean_plane,
+            cell_margin: e.margin,
         }),
     }
 }

@@ -4,6 +4,8 @@ mod count;
 pub(crate) mod lattice;
 pub(crate) mod thesis;
 
+use net_flow::vote::VoteResult;
+
 use crate::estimate::{Connection, NetPose};
 
 /// What a method says of one frame, before the decision whether to vouch for it.
@@ -21,6 +23,8 @@ pub(crate) struct Found {
     pub corrected: (i32, i32),
     /// [`crate::Estimate::in_doubt`].
     pub in_doubt: u32,
+    /// [`crate::Estimate::vote`].
+    pub vote: Option<VoteResult>,
 }
 
 /// Numbers the counts of cells: each has an origin of its own.

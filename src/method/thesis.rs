@@ -115,6 +115,7 @@ impl ThesisMethod {
             connection: self.connection,
             corrected: (0, 0),
             in_doubt: 0,
+            vote: None,
         }
     }
 }

@@ -65,7 +65,7 @@ fn main() {
                     e.pose.plane().distance,
                     e.pose.plane().tilt().to_degrees(),
                     e.crossing_angle.to_degrees(),
-                    e.crossing_angle_sigma.to_degrees(),
+                    e.crossing_angle_sigma.unwrap_or_default().to_degrees(),
                     e.curvatures,
                     evidence::line(&e)
                 );

@@ -70,7 +70,7 @@ pub struct AxisTruth {
     pub directions: [Vector3<f64>; 2],
     /// Angle from the first to the second mesh direction there, rad.
     pub crossing_angle: f64,
-    /// Principal curvatures there, 1/m, the larger first; positive bends away from the camera at the sides.
+    /// Principal curvatures there, 1/m, the larger magnitude first; positive bends away from the camera at the sides.
     pub curvatures_per_m: [f64; 2],
 }
 

@@ -131,6 +131,12 @@ class Estimate:
     def lattice(self) -> npt.NDArray[np.int64]:
         """(N, 2) lattice indices (i, j) of ``junctions``; the lowest int32 where a junction has no name."""
     @property
+    def sigma_px(self) -> npt.NDArray[np.float64]:
+        """(N,) one standard deviation of each junction's pixel, each axis, px."""
+    @property
+    def states(self) -> list[Literal["seen", "hidden", "fouled", "missing"]]:
+        """What is known of each of the ``junctions``."""
+    @property
     def track(self) -> int:
         """Number of the count of cells: frames of the same number have the same node as origin."""
     @property
@@ -139,6 +145,14 @@ class Estimate:
         the best guess, perhaps off by whole cells, under a number of its own. ``settled``: frames together told what one did not, and the
         count before the doubt goes on. ``recognised``: the net was lost, and what was seen of its cells before told which ones these are.
         ``restarted``: it was lost, and a new count began."""
+    @property
+    def shifts(self) -> list[tuple[int, int, float]]:
+        """The likeliest shifts (i, j) in cells *per frame* of the names that this frame came with, and by how many deviations each stands
+        out, best first: what does not repeat in the picture says so, over as many frames as were in doubt. Empty where there was nothing to
+        compare with."""
+    @property
+    def log_odds(self) -> float | None:
+        """Natural logarithm of the odds of the best of ``shifts`` to the second."""
     @property
     def layers(self) -> list[Layer]:
         """All nets that can be vouched for, nearest first, with ``layers=True``; empty without, and with no pose."""
@@ -155,8 +169,25 @@ class Estimate:
     def crossing_angle(self) -> float | None:
         """From X to the second mesh direction at the optical axis, rad. None from ``method="thesis"``."""
     @property
+    def sigma_crossing_angle(self) -> float | None:
+        """One standard deviation of it, rad; None where it was held at the mesh's own."""
+    @property
     def curvatures_per_m(self) -> tuple[float, float] | None:
-        """Principal curvatures at the optical axis, 1/m; positive bends away. None from ``method="thesis"``."""
+        """Principal curvatures at the optical axis, 1/m, the larger magnitude first; positive bends away. None from ``method="thesis"``."""
+    @property
+    def sigma_curvatures_per_m(self) -> tuple[float, float] | None:
+        """One standard deviation of each, 1/m; None where the net was held flat."""
+    @property
+    def mean_normal(self) -> npt.NDArray[np.float64] | None:
+        """(3,) unit normal of the mean plane about the optical axis, camera frame; ``normal`` is that of the tangent plane on the
+        axis. None from ``method="thesis"``, as the next two."""
+    @property
+    def mean_distance_m(self) -> float | None:
+        """Perpendicular distance of the mean plane, m."""
+    @property
+    def cell_margin(self) -> float | None:
+        """How much worse a drawing with the best of other cells (halves, doubles, thirds, sides swapped) explains the picture, as a share of
+        what this one explains; in [-1, 1]. Of a followed net that of its first picture."""
 
 @final
 class Layer:
@@ -184,6 +215,38 @@ class Layer:
     @property
     def covariance(self) -> npt.NDArray[np.float64]:
         """(6, 6), rotation (rad) then translation (m), perturbation in the camera frame."""
+    @property
+    def sigma_range_m(self) -> float:
+        """One standard deviation of the range, m."""
+    @property
+    def sigma_tilt(self) -> float:
+        """One standard deviation of the normal's direction, root mean square over both axes, rad."""
+    @property
+    def sigma_xy_m(self) -> float:
+        """One standard deviation of the place along the net, root mean square over both axes, m."""
+    @property
+    def crossing_angle(self) -> float | None:
+        """From X to the second mesh direction at the optical axis, rad. None from ``method="thesis"``."""
+    @property
+    def sigma_crossing_angle(self) -> float | None:
+        """One standard deviation of it, rad; None where it was held at the mesh's own."""
+    @property
+    def curvatures_per_m(self) -> tuple[float, float] | None:
+        """Principal curvatures at the optical axis, 1/m, the larger magnitude first; positive bends away. None from ``method="thesis"``."""
+    @property
+    def sigma_curvatures_per_m(self) -> tuple[float, float] | None:
+        """One standard deviation of each, 1/m; None where the net was held flat."""
+    @property
+    def mean_normal(self) -> npt.NDArray[np.float64] | None:
+        """(3,) unit normal of the mean plane about the optical axis, camera frame; ``normal`` is that of the tangent plane on the
+        axis. None from ``method="thesis"``, as the next two."""
+    @property
+    def mean_distance_m(self) -> float | None:
+        """Perpendicular distance of the mean plane, m."""
+    @property
+    def cell_margin(self) -> float | None:
+        """How much worse a drawing with the best of other cells (halves, doubles, thirds, sides swapped) explains the picture, as a share of
+        what this one explains; in [-1, 1]. Of a followed net that of its first picture."""
 
 @final
 class Tracker:
@@ -343,7 +406,7 @@ class SimFrame:
         """Angle between the mesh directions at the optical axis, rad."""
     @property
     def curvatures_per_m(self) -> tuple[float, float] | None:
-        """Principal curvatures at the optical axis, 1/m."""
+        """Principal curvatures at the optical axis, 1/m, the larger magnitude first."""
     @property
     def pose(self) -> npt.NDArray[np.float64] | None:
         """(4, 4) net to camera; the origin is the scene's node (0, 0)."""

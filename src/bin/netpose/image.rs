@@ -172,8 +172,12 @@ fn describe(net: &NetPose, line: &mut Value) {
     line["sigma_xy_m"] = json!(net.sigma_xy_m);
     if let Some(sheet) = &net.sheet {
         line["crossing_angle_deg"] = json!(sheet.crossing_angle.to_degrees());
-        line["sigma_crossing_angle_deg"] = json!(sheet.sigma_crossing_angle.to_degrees());
+        line["sigma_crossing_angle_deg"] = json!(sheet.sigma_crossing_angle.map(f64::to_degrees));
         line["curvatures_per_m"] = json!(sheet.curvatures_per_m);
+        line["sigma_curvatures_per_m"] = json!(sheet.sigma_curvatures_per_m);
+        line["mean_normal"] = json!(sheet.mean_plane.normal.as_slice());
+        line["mean_distance_m"] = json!(sheet.mean_plane.distance);
+        line["cell_margin"] = json!(sheet.cell_margin);
     }
 }
 

@@ -5,18 +5,20 @@ use net_geometry::nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3}
 use crate::answer::estimate::Labels;
 use crate::sheet::alike::Influence;
 use crate::sheet::fit::{Fit, Fitter, Observation, Robust};
-use crate::sheet::surface::{PARAMETERS, Params, Surface};
+use crate::sheet::surface::{PARAMETERS, Params, QUADRATIC, SHAPE, Surface};
 
 /// What is known of the errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Errors {
     /// Covariance: rotation (rad) then translation (m), perturbations in the camera frame.
     pub pose: Matrix6<f64>,
-    /// Standard deviations: of the depth on the axis, m; the normal's direction, rad; the place in the net plane, m; the crossing angle, rad.
+    /// Standard deviations: of the depth on the axis, m; the normal's direction, rad; the place in the net plane, m; the crossing angle, rad, unless it was held.
     pub range: f64,
     pub tilt: f64,
     pub xy: f64,
-    pub angle: f64,
+    pub angle: Option<f64>,
+    /// Of the principal curvatures, 1/m, unless the sheet was held flat.
+    pub curvatures: Option<[f64; 2]>,
 }
 
 /// What makes errors besides the observations' noise.
@@ -69,7 +71,24 @@ pub(crate) fn errors(
             c[a][b] += noise * formal[a][b] + consider[a] * consider[b];
         }
     }
-    pose(surface, labels, &c, count, doubt.bumps)
+    let curvatures = (count >= SHAPE + QUADRATIC).then(|| curvatures(fitter, surface, &c));
+    Errors { curvatures, ..pose(surface, labels, &c, count, doubt.bumps) }
+}
+
+/// Standard deviations of the principal curvatures: a change of the second derivatives changes each by what it is along its own direction, to first order.
+fn curvatures(fitter: &Fitter, surface: &Surface, covariance: &[[f64; PARAMETERS]; PARAMETERS]) -> [f64; 2] {
+    surface.principal().map(|(_, [x, y])| {
+        let along = [x * x, 2.0 * x * y, y * y];
+        // Of the parameters, and of the coefficients of a relief, which follow them.
+        let (mut own, mut open) = ([0.0; PARAMETERS], 0.0);
+        own[SHAPE..SHAPE + QUADRATIC].copy_from_slice(&along);
+        if let Some(relief) = &surface.relief {
+            open = fitter.bumps.carry(&relief.curvature_row(along), &mut own);
+        }
+        let of = |row: &[f64; PARAMETERS]| row.iter().zip(&own).map(|(c, d)| c * d).sum::<f64>();
+        let variance: f64 = covariance.iter().zip(&own).map(|(row, d)| d * of(row)).sum();
+        (variance + open).max(0.0).sqrt()
+    })
 }
 
 /// From the parameters to the pose in the net frame, by differences.
@@ -113,6 +132,7 @@ fn pose(
         range: surface.depth * covariance[3][3].max(0.0).sqrt(),
         tilt,
         xy,
-        angle: if count > 6 { covariance[6][6].max(0.0).sqrt() } else { 0.0 },
+        angle: (count > 6).then(|| covariance[6][6].max(0.0).sqrt()),
+        curvatures: None,
     }
 }

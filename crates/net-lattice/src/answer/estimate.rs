@@ -27,10 +27,12 @@ pub struct LatticeEstimate {
     pub mean_plane: Plane,
     /// Angle from X to the other family of twine, rad.
     pub crossing_angle: f64,
-    /// One standard deviation of the crossing angle, rad; zero when it was held.
-    pub crossing_angle_sigma: f64,
+    /// One standard deviation of the crossing angle, rad; `None` when it was held.
+    pub crossing_angle_sigma: Option<f64>,
     /// Principal curvatures of the sheet on the axis, 1/m, larger magnitude first; positive bends away from the camera.
     pub curvatures: [f64; 2],
+    /// One standard deviation of each, 1/m; `None` when the sheet was held flat.
+    pub curvature_sigmas: Option<[f64; 2]>,
     /// Side lengths along X and along the other family, m.
     pub sides: [f64; 2],
     /// Probability that there is a net and that range is within 5 %, normal and in-plane rotation within 5 degrees.

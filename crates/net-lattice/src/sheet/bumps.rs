@@ -4,11 +4,8 @@ use crate::numeric::Normal;
 use crate::sheet::chart::Point;
 use crate::sheet::fit::{Fit, Fitter, Observation, Prior, Robust, damped, sound};
 use crate::sheet::relief::{COEFFICIENTS, Relief, Row};
-use crate::sheet::surface::{PARAMETERS, Params, SHAPE, Surface};
+use crate::sheet::surface::{PARAMETERS, Params, QUADRATIC, SHAPE, Surface};
 use net_image::widely;
-
-/// Terms of the polynomial that stay beside the relief: the quadratic ones.
-const QUADRATIC: usize = 3;
 
 /// Normal equations of the coefficients, and what they share with the parameters.
 #[derive(Debug, Default)]
@@ -87,6 +84,19 @@ impl Bumps {
                 n.b[i] -= y[i] * b;
             }
         }
+    }
+
+    /// Adds to a function's derivatives by the parameters what the coefficients, by which it has the derivatives `row`, change with them, once they were eliminated and put
+    /// back; returns the variance that they leave open by themselves.
+    pub(crate) fn carry(&self, row: &Row, own: &mut Params) -> f64 {
+        for (r, x) in row.iter().zip(&self.cross) {
+            own.iter_mut().zip(x).for_each(|(d, x)| *d -= r * x);
+        }
+        let mut solved = [0.0; COEFFICIENTS];
+        for (i, factor) in self.a.iter().enumerate() {
+            solved[i] = (row[i] - dot(&factor[..i], &solved[..i])) / factor[i];
+        }
+        dot(&solved, &solved)
     }
 
     /// What the factor's transpose, inverted, makes of `b - cross d`, in the place of `b`; and of `cross`, in its place.

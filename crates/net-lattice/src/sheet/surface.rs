@@ -14,6 +14,8 @@ use crate::sheet::relief::Relief;
 pub(crate) const PARAMETERS: usize = 21;
 /// The first of those that are the sheet's shape: height and thread bending.
 pub(crate) const SHAPE: usize = 7;
+/// How many of the height's terms are its second derivatives, the first ones.
+pub(crate) const QUADRATIC: usize = 3;
 /// A step, or a prior's standard deviations, in that order.
 pub(crate) type Params = [f64; PARAMETERS];
 
@@ -86,6 +88,16 @@ impl Surface {
     /// Whether nothing rises above the tangent plane.
     pub(crate) fn is_flat(&self) -> bool {
         self.relief.is_none() && self.height.iter().all(|c| *c == 0.0)
+    }
+
+    /// Principal curvatures on the axis, 1/m, the larger magnitude first, and their unit directions in the tangent frame. The normal points away from the camera, so a positive one bends away.
+    pub(crate) fn principal(&self) -> [(f64, [f64; 2]); 2] {
+        let bumps = self.relief.map_or([0.0; QUADRATIC], |relief| relief.curvature());
+        let [a, b, c] = std::array::from_fn(|k| self.height[k] + bumps[k]);
+        let (mean, half) = (0.5 * (a + c), f64::hypot(0.5 * (a - c), b));
+        let (y, x) = (0.5 * f64::atan2(2.0 * b, a - c)).sin_cos();
+        let (upper, lower) = ((mean + half, [x, y]), (mean - half, [-y, x]));
+        if upper.0.abs() >= lower.0.abs() { [upper, lower] } else { [lower, upper] }
     }
 
     /// The state without relief, with all parameters from `count` on at their prior mean.

@@ -76,7 +76,8 @@ impl Workspace {
             mean_plane,
             crossing_angle: if odd { std::f64::consts::PI - surface.angle } else { surface.angle },
             crossing_angle_sigma: errors.angle,
-            curvatures: curvatures(&surface),
+            curvatures: surface.principal().map(|(curvature, _)| curvature),
+            curvature_sigmas: errors.curvatures,
             sides: labels.families(surface.sides),
             probability: evidence.probability(errors.tilt),
             evidence,
@@ -122,14 +123,4 @@ impl Workspace {
         }
         Plane { normal, distance: normal.dot(&mean) }
     }
-}
-
-/// Principal curvatures on the axis, larger magnitude first. The normal points away from the camera, so a positive height is farther away.
-fn curvatures(surface: &Surface) -> [f64; 2] {
-    let bumps = surface.relief.map_or([0.0; 3], |relief| relief.curvature());
-    let [a, b, c] = std::array::from_fn(|k| surface.height[k] + bumps[k]);
-    let mean = 0.5 * (a + c);
-    let half = (0.25 * (a - c) * (a - c) + b * b).sqrt();
-    let (p, q) = (mean + half, mean - half);
-    if p.abs() >= q.abs() { [p, q] } else { [q, p] }
 }

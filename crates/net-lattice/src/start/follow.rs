@@ -45,8 +45,8 @@ impl Workspace {
         let seed = Seed { centre: self.view.centre, looks: last.looks };
         let place = self.coarse_scale_for(start.depth);
         // A relief is carried along as it is until the drawing tells its coefficients.
-        let settled = if last.model == Model::Bumpy { Model::Quadratic } else { last.model.max(Model::Rhomb) };
-        for (radius, model) in [(NEAR, Model::Rhomb), (last.focus, settled)] {
+        let settled = if last.model == Model::Bumpy { Model::Quadratic } else { last.model };
+        for (radius, model) in [(NEAR, settled.min(Model::Rhomb)), (last.focus, settled)] {
             let gain = self.sums_at(&surface, place);
             self.comb(&surface, place, [1.0; 2], seed.looks, gain);
             self.observe_measured(&self.window(radius));

@@ -67,7 +67,7 @@ impl Sheet {
         Vector3::new(p.x, p.y, self.height(p).0)
     }
 
-    /// Principal curvatures over `p`, 1/m, the larger one first; positive bends away from the camera at the sides.
+    /// Principal curvatures over `p`, 1/m, the larger magnitude first; positive bends away from the camera at the sides.
     pub(crate) fn curvatures(&self, p: Vector2<f64>) -> [f64; 2] {
         if self.flat {
             return [0.0; 2];
@@ -82,6 +82,7 @@ impl Sheet {
         let shape = first.try_inverse().unwrap_or_else(Matrix2::identity) * second;
         let (half_trace, det) = (0.5 * shape.trace(), shape.determinant());
         let root = (half_trace * half_trace - det).max(0.0).sqrt();
-        [half_trace + root, half_trace - root]
+        let (upper, lower) = (half_trace + root, half_trace - root);
+        if upper.abs() >= lower.abs() { [upper, lower] } else { [lower, upper] }
     }
 }

@@ -92,10 +92,12 @@ fn cells(scene: &Examined) -> Result<Vec<Cell>> {
     put("crossing_deg", of(|e| e.crossing_angle.to_degrees()));
     put("curvature_1_per_m", of(|e| e.curvatures[0]));
     put("curvature_2_per_m", of(|e| e.curvatures[1]));
+    put("sigma_curvature_1_per_m", of(|e| e.curvature_sigmas.map_or(f64::NAN, |s| s[0])));
+    put("sigma_curvature_2_per_m", of(|e| e.curvature_sigmas.map_or(f64::NAN, |s| s[1])));
     put("sigma_range_m", of(|e| e.range_sigma));
     put("sigma_tilt_deg", of(|e| e.tilt_sigma.to_degrees()));
     put("sigma_xy_m", of(|e| e.xy_sigma));
-    put("sigma_crossing_deg", of(|e| e.crossing_angle_sigma.to_degrees()));
+    put("sigma_crossing_deg", of(|e| e.crossing_angle_sigma.unwrap_or(f64::NAN).to_degrees()));
     put("gain", of(|e| e.gain));
     put("margin", of(|e| e.margin));
     put("blur_px", of(|e| e.blur));

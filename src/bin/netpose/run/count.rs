@@ -8,7 +8,7 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use net_flow::vote::{CellMap, CellVote, RecallConfig, Verdict, VoteConfig};
+use net_flow::vote::{CellMap, CellVote, RecallConfig, ShiftScore, Verdict, VoteConfig};
 use net_geometry::nalgebra::Vector2;
 use net_image::GrayView;
 use netpose::{Connection, Tracker};
@@ -17,7 +17,10 @@ use super::doubt::share;
 use super::frames::Tracked;
 
 /// The columns of `count.csv`.
-pub const HEADER: [&str; 8] = ["frame", "track", "stretch", "offset_i", "offset_j", "verdict", "z", "sure"];
+pub const HEADER: [&str; 14] = [
+    "frame", "track", "stretch", "offset_i", "offset_j", "verdict", "z", "sure", "best_i", "best_j", "rival_i",
+    "rival_j", "rival_z", "log_odds",
+];
 
 /// Removes the table of an earlier run.
 pub fn forget(dir: &Path) -> Result<()> {
@@ -66,6 +69,8 @@ pub struct Counted {
     pub offset: (i32, i32),
     said: Said,
     z: f64,
+    /// The likeliest shift a frame and its rival, of the coordinates that the frame came with, and the logarithm of their odds; `None` where nothing was compared.
+    shifts: Option<([ShiftScore; 2], f64)>,
     /// Which of the frames in doubt this is to the tracker, from 1; 0 if it is none.
     doubt: u32,
     /// Whether this is certain: an undecided frame is left out of the map.
@@ -220,7 +225,9 @@ impl Count {
             self.middle = plus(middle, self.offset);
         }
         let (stretch, doubt) = (self.stretch, named.in_doubt);
-        let counted = Counted { frame, track, stretch, offset: self.offset, said, z, doubt, sure };
+        let compared = matches!(result.verdict, Verdict::Decided | Verdict::Ambiguous);
+        let shifts = compared.then_some(([result.shifts[0], result.shifts[1]], result.log_odds));
+        let counted = Counted { frame, track, stretch, offset: self.offset, said, z, shifts, doubt, sure };
         if sure || result.verdict == Verdict::Blind {
             self.write(&counted)?;
         } else {
@@ -307,7 +314,12 @@ impl Count {
         let cells =
             [c.offset.0.to_string(), c.offset.1.to_string(), verdict.to_owned(), z, u8::from(c.sure).to_string()];
         let names = [c.frame.to_string(), c.track.to_string(), c.stretch.to_string()];
-        Ok(self.table.write_record(names.into_iter().chain(cells))?)
+        let odds = c.shifts.map_or_else(Default::default, |([best, rival], log_odds)| {
+            let [b, r] = [best, rival].map(|s| [s.cells.0.to_string(), s.cells.1.to_string()]);
+            let [[b_i, b_j], [r_i, r_j]] = [b, r];
+            [b_i, b_j, r_i, r_j, format!("{:.2}", rival.z), format!("{log_odds:.2}")]
+        });
+        Ok(self.table.write_record(names.into_iter().chain(cells).chain(odds))?)
     }
 }
 

@@ -18,8 +18,23 @@ use crate::draw::Overlay;
 use crate::failure::Outcome;
 
 /// Columns of `poses.csv` behind the usual ones: the count of cells, and how the net hangs where the method estimates it.
-pub const APPENDED: [&str; 6] =
-    ["track", "crossing_angle_deg", "sigma_crossing_angle_deg", "curvature_1_per_m", "curvature_2_per_m", "recognised"];
+pub const APPENDED: [&str; 13] = [
+    "track",
+    "crossing_angle_deg",
+    "sigma_crossing_angle_deg",
+    "curvature_1_per_m",
+    "curvature_2_per_m",
+    "recognised",
+    "sigma_curvature_1_per_m",
+    "sigma_curvature_2_per_m",
+    "mean_normal_x",
+    "mean_normal_y",
+    "mean_normal_z",
+    "mean_distance_m",
+    "cell_margin",
+];
+/// Where `recognised` is among them, behind `track` and the first columns of [`hanging`].
+const RECOGNISED: usize = 5;
 
 /// What to do with what is in the folder already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -261,17 +276,30 @@ fn appended(tracked: &Tracked, first_track: u32) -> Vec<f64> {
     let mut cells = vec![f64::NAN; APPENDED.len()];
     let Some(net) = &tracked.net else { return cells };
     cells[0] = f64::from(first_track.saturating_add(tracked.track));
-    cells[1..5].copy_from_slice(&hanging(net));
-    cells[5] = f64::from(u8::from(tracked.connection == Connection::Recognised));
+    let hanging = hanging(net);
+    let (before, behind) = hanging.split_at(RECOGNISED - 1);
+    cells[1..RECOGNISED].copy_from_slice(before);
+    cells[RECOGNISED] = f64::from(u8::from(tracked.connection == Connection::Recognised));
+    cells[RECOGNISED + 1..].copy_from_slice(behind);
     cells
 }
 
-/// How a net hangs: [`APPENDED`] from the second to the fifth.
-pub fn hanging(net: &NetPose) -> [f64; 4] {
-    net.sheet.map_or([f64::NAN; 4], |sheet| {
+/// How a net hangs: [`APPENDED`] without `track` and `recognised`. NaN, an empty cell, for what was held and not estimated.
+pub fn hanging(net: &NetPose) -> [f64; 11] {
+    net.sheet.map_or([f64::NAN; 11], |sheet| {
         let [larger, smaller] = sheet.curvatures_per_m;
-        [sheet.crossing_angle.to_degrees(), sheet.sigma_crossing_angle.to_degrees(), larger, smaller]
+        let [sigma_larger, sigma_smaller] = sheet.sigma_curvatures_per_m.unwrap_or([f64::NAN; 2]);
+        let (angle, sigma) = (sheet.crossing_angle, sheet.sigma_crossing_angle.unwrap_or(f64::NAN));
+        let (mean, margin) = (sheet.mean_plane, sheet.cell_margin);
+        let [x, y, z]: [f64; 3] = mean.normal.into();
+        let sheared = [angle.to_degrees(), sigma.to_degrees()];
+        [sheared[0], sheared[1], larger, smaller, sigma_larger, sigma_smaller, x, y, z, mean.distance, margin]
     })
+}
+
+/// The names of what [`hanging`] has.
+pub fn hanging_names() -> impl Iterator<Item = &'static str> {
+    APPENDED.into_iter().filter(|name| !["track", "recognised"].contains(name))
 }
 
 /// For tables.

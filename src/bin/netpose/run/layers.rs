@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use net_log::{PoseRow, PosesCsv, RawFrame, RowStatus};
 
-use super::folder::{APPENDED, columns, hanging, milliseconds};
+use super::folder::{columns, hanging, hanging_names, milliseconds};
 use super::frames::Tracked;
+
+/// Columns of a hanging net before `layer` and `followed`.
+const SHEARED_AND_BENT: usize = 4;
 
 /// Writes a row for each net of a frame.
 pub struct LayersCsv(PosesCsv);
@@ -14,7 +17,9 @@ pub struct LayersCsv(PosesCsv);
 impl LayersCsv {
     /// A new file in the run's folder.
     pub fn create(dir: &Path) -> Result<Self> {
-        let appended: Vec<&str> = APPENDED[1..5].iter().copied().chain(["layer", "followed"]).collect();
+        let (first, behind): (Vec<_>, Vec<_>) = hanging_names().enumerate().partition(|(k, _)| *k < SHEARED_AND_BENT);
+        let appended = first.into_iter().map(|(_, name)| name).chain(["layer", "followed"]);
+        let appended: Vec<&str> = appended.chain(behind.into_iter().map(|(_, name)| name)).collect();
         Ok(Self(PosesCsv::create(&path(dir), &appended)?))
     }
 
@@ -22,7 +27,8 @@ impl LayersCsv {
     pub fn write(&mut self, frame: &RawFrame, tracked: &Tracked) -> Result<()> {
         for (number, layer) in tracked.layers.iter().enumerate() {
             let mut appended = hanging(&layer.net).to_vec();
-            appended.extend([number as f64, f64::from(u8::from(layer.followed))]);
+            let which = [number as f64, f64::from(u8::from(layer.followed))];
+            appended.splice(SHEARED_AND_BENT..SHEARED_AND_BENT, which);
             self.0.write(&PoseRow {
                 frame: frame.index,
                 file: frame.name.to_string(),

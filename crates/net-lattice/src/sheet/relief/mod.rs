@@ -71,6 +71,15 @@ impl Four {
     }
 }
 
+/// Second derivatives of the weights of [`Four`], 1/m².
+fn second(place: f64, spacing: f64) -> [f64; 4] {
+    let inside = place.clamp(1.0, 1.0 + GAPS - 1e-9);
+    let u = inside - inside.floor();
+    let v = 1.0 - u;
+    let per = if inside == place { 1.0 / (spacing * spacing) } else { 0.0 };
+    [v, 3.0 * u - 2.0, 3.0 * v - 2.0, u].map(|s| s * per)
+}
+
 fn dot(a: &[f64; 4], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -189,6 +198,20 @@ impl Relief {
         dot(&four.value, &self.coefficients[GRID + family * SIDE + four.first..]) - value - slope * s
     }
 
+    /// Derivatives, by the coefficients, of a weighted sum of the second derivatives at the axis: xx, xy, yy.
+    pub(crate) fn curvature_row(&self, [xx, xy, yy]: [f64; 3]) -> Row {
+        let (column, row) = (self.column(0.0), self.row(0.0));
+        let [cc, rr] = self.origin.map(|o| second(-o / self.spacing, self.spacing));
+        let mut derivatives = [0.0; COEFFICIENTS];
+        for j in 0..4 {
+            for i in 0..4 {
+                derivatives[(row.first + j) * SIDE + column.first + i] =
+                    xx * cc[i] * row.value[j] + xy * column.slope[i] * row.slope[j] + yy * column.value[i] * rr[j];
+            }
+        }
+        derivatives
+    }
+
     /// Second derivatives at the axis: xx, xy, yy.
     pub(crate) fn curvature(&self) -> [f64; 3] {
         let h = 1e-3 * self.spacing;
@@ -223,6 +246,18 @@ mod tests {
             // differences of sums of sixteen: rounding only
             assert!(r.at(0.0, 0.0).into_iter().all(|v| v.abs() < 1e-15), "{:?}", r.at(0.0, 0.0));
             assert!(r.aside(0, 0.0).abs() < 1e-15 && (r.aside(1, 1e-6) - r.aside(1, -1e-6)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn second_derivatives_are_a_sum_over_coefficients() {
+        let r = bumpy().about([0.13, -0.07], [0.13, -0.07]);
+        let second = r.curvature();
+        for k in 0..3 {
+            let row = r.curvature_row(std::array::from_fn(|l| f64::from(u8::from(k == l))));
+            let sum: f64 = row.iter().zip(r.coefficients()).map(|(d, c)| d * c).sum();
+            // central differences over a thousandth of the spacing, of slopes that are piecewise quadratic
+            assert!((sum - second[k]).abs() < 1e-3 * second[k].abs() + 1e-9, "{k}: {sum} {}", second[k]);
         }
     }
 
