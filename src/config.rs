@@ -46,6 +46,9 @@ impl Config {
     /// # Errors
     /// [`crate::Error`] names the field and the value.
     pub fn validate(&self) -> Result<()> {
+        if self.layers && self.method == Method::Thesis {
+            return Err(Error::LatticeOnly { field: "layers" });
+        }
         self.lattice.validate()?;
         Ok(self.thesis.validate()?)
     }

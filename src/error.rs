@@ -13,6 +13,12 @@ pub enum Error {
         /// The name that was given.
         name: String,
     },
+    /// Something that only the lattice can tell was asked of another method.
+    #[error("{field} goes with method lattice only, and method is thesis")]
+    LatticeOnly {
+        /// What was asked for.
+        field: &'static str,
+    },
     /// The lattice estimator.
     #[error(transparent)]
     Lattice(#[from] net_lattice::Error),

@@ -10,6 +10,8 @@ mod knots;
 mod method;
 mod motion;
 mod prior;
+#[cfg(feature = "smooth")]
+pub mod smooth;
 mod tracker;
 
 pub use config::{Config, Method};

@@ -67,6 +67,14 @@ fn what_cannot_be_smoothed_or_mapped_is_said() {
     assert_status(&output, 0);
     assert_says(&output, &["map: 0 holes, 0 pictures"]);
     assert!(stdout(&output).contains("0 poses smoothed"), "{}", stdout(&output));
+    // The thesis's method knows no twines: its map would be that of a net without holes.
+    let thesis = scratch.write("thesis.toml", "method = \"thesis\"\n");
+    let thesis = thesis.to_str().unwrap();
+    for (asked, named) in [("--map", "--map"), ("--layers", "layers")] {
+        let output = scratch.run(&[asked, "--force", "--config", thesis]);
+        assert_status(&output, 2);
+        assert_says(&output, &[named, "thesis"]);
+    }
     let wrong = scratch.write("smooth.toml", "acceleration_density = -1.0\n");
     let output = netpose().arg("smooth").arg(scratch.path("out")).arg("--config").arg(wrong).output().unwrap();
     assert_status(&output, 2);

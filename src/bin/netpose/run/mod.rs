@@ -15,6 +15,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use net_log::{LogInfo, LogSummary, OpenOptions, RunSummary, TimeBound};
 
+use netpose::Method;
+
 use crate::describe::{self, times};
 use crate::failure::{Outcome, Usage, as_usage};
 use crate::interrupt::Interrupt;
@@ -80,6 +82,11 @@ pub fn main(args: &Args) -> Result<Outcome> {
     if config.layers && args.resume {
         bail!(Usage("--resume does not go with layers = true of --config: layers.csv is not resumed".into()));
     }
+    // An empty map would read as a net without holes.
+    if args.map && config.method == Method::Thesis {
+        bail!(Usage("--map goes with method lattice only, and --config says method = \"thesis\"".into()));
+    }
+    config.validate().map_err(|e| Usage(e.to_string()))?;
     args.check()?;
     let log = net_log::open(&args.log, &args.open_options()).map_err(as_usage)?;
     let camera = args.setup.camera(log.info())?;
