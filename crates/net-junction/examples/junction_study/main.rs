@@ -21,6 +21,9 @@ use net_lattice::{Config, LatticeEstimator};
 use sample::{EstimatedMap, Sample};
 use score::{Score, score};
 
+/// Knots of smaller cells have no part in the figures: the adjustment tries them as well.
+const SCORED_CELL_PX: f64 = 4.5;
+
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// Repeated calls of which the fastest counts.
@@ -83,7 +86,7 @@ impl Kind {
         let mut adjuster = NetAdjuster::new(view.width(), view.height(), &config)?;
         let map = sample.true_map().ok_or("too few knots in view")?;
         let milliseconds = time(&mut adjuster, sample, &map)?;
-        let found = score(&adjuster, sample, &map, config.cell_min_px, false);
+        let found = score(&adjuster, sample, &map, SCORED_CELL_PX, false);
         let nodes = found.in_view;
         if let Some(folder) = &options.overlays {
             overlay::draw(folder, sample, &adjuster, "")?;
@@ -101,7 +104,7 @@ impl Kind {
                 None => self.refused += 1,
                 Some(estimate) => {
                     adjuster.adjust(view, &EstimatedMap { estimate: &estimate, camera: &sample.camera })?;
-                    let found = score(&adjuster, sample, &map, config.cell_min_px, true);
+                    let found = score(&adjuster, sample, &map, SCORED_CELL_PX, true);
                     if let Some(folder) = &options.overlays {
                         overlay::draw(folder, sample, &adjuster, "_estimated")?;
                     }

@@ -37,7 +37,7 @@ pub struct AdjustConfig {
 impl Default for AdjustConfig {
     fn default() -> Self {
         Self {
-            cell_min_px: 4.5,
+            cell_min_px: 3.5,
             search_cells: vec![0.34, 0.2, 0.12],
             point_spread_px: 0.75,
             twines_m: vec![0.001, 0.0015, 0.002, 0.0025, 0.003, 0.0035, 0.0045],
