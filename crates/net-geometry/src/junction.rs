@@ -14,6 +14,8 @@ pub enum JunctionState {
     Fouled,
     /// All its twines are gone.
     Missing,
+    /// Too faint to be measured, between others that were: where these have it.
+    Inferred,
 }
 
 impl JunctionState {
@@ -24,6 +26,7 @@ impl JunctionState {
             Self::Hidden => "hidden",
             Self::Fouled => "fouled",
             Self::Missing => "missing",
+            Self::Inferred => "inferred",
         }
     }
 }

@@ -156,6 +156,7 @@ fn draw(detector: &JunctionDetector, junctions: &[Junction], picture: &image::Gr
             (JunctionState::Hidden, _) => Rgb([80, 80, 255]),
             (JunctionState::Fouled, _) => Rgb([0, 160, 60]),
             (JunctionState::Missing, _) => Rgb([255, 0, 0]),
+            (JunctionState::Inferred, _) => Rgb([160, 160, 0]),
         };
         for arm in [Vector2::new(1.5, 0.0), Vector2::new(0.0, 1.5)] {
             draw_line(&mut canvas, junction.pixel - arm, junction.pixel + arm, colour, scale);

@@ -103,6 +103,30 @@ fn knots_lead_on_where_the_prediction_ends() {
 }
 
 #[test]
+fn knots_too_faint_to_be_measured_lie_between_those_that_are() {
+    let s = Scene { contrast: 17.0, ..scene(2.0, 5.0, 10.0, 6.0) };
+    let (mut picture, water) = (s.draw(), Scene { contrast: 0.0, ..s.clone() }.draw());
+    // Towards a place beside the middle twine fades into the same noise, over ten cells, as shaded twine does where it turns from light to dark.
+    let (middle, radius) = (Vector2::new(WIDTH as f64 * 0.35, HEIGHT as f64 * 0.5), 10.0 * s.cell_px());
+    for (k, (p, water)) in picture.iter_mut().zip(water).enumerate() {
+        let away = Vector2::new((k % WIDTH) as f64, (k / WIDTH) as f64) - middle;
+        let share = (away.norm() / radius).clamp(0.05, 1.0);
+        *p = (share * f64::from(*p) + (1.0 - share) * f64::from(water)).round() as u8;
+    }
+    let mut adjuster = NetAdjuster::new(WIDTH, HEIGHT, &AdjustConfig::default()).unwrap();
+    let junctions = adjuster.adjust(view(&picture), &s.net).unwrap();
+    let inferred: Vec<_> = junctions.iter().filter(|j| j.state == JunctionState::Inferred).copied().collect();
+    let got = score(&inferred, &s.nodes(-2.0), &s.inner_nodes(1.0, 5.0), 2.0);
+    println!("{got:?}");
+    // Within three cells some thirty knots have less than a third of the contrast; of the others one in a hundred may be too faint.
+    let near = inferred.iter().filter(|j| (j.pixel - middle).norm() < radius).count();
+    assert!(near > 8 && (got.found - near) * 100 < got.truth, "{near} of {got:?}");
+    assert_eq!((got.right, got.named_wrong), (got.found, 0), "{got:?}");
+    // Drawn knots wander less from their neighbours than real ones, for which sigma makes allowance.
+    assert!(got.error_over_sigma < 1.2, "{got:?}");
+}
+
+#[test]
 fn water_has_no_nodes() {
     for noise in [0.0, 3.0, 15.0] {
         let s = Scene { contrast: 0.0, noise, ..scene(1.0, 0.0, 20.0, 0.0) };

@@ -23,12 +23,18 @@ fn camera(lens: Lens) -> Camera {
 
 /// `count` junctions, named but for every seventh.
 fn junctions(frame: u64, count: usize) -> Vec<Junction> {
-    let states = [JunctionState::Seen, JunctionState::Hidden, JunctionState::Fouled, JunctionState::Missing];
+    let states = [
+        JunctionState::Seen,
+        JunctionState::Hidden,
+        JunctionState::Fouled,
+        JunctionState::Missing,
+        JunctionState::Inferred,
+    ];
     let junction = |n: usize| Junction {
         pixel: Vector2::new(frame as f64 + n as f64 / 3.0, -1.5 * n as f64),
         index: (!n.is_multiple_of(7)).then_some((n as i32 - 5, frame as i32)),
         sigma_px: 0.01 * n as f64,
-        state: states[n % 4],
+        state: states[n % states.len()],
     };
     (0..count).map(junction).collect()
 }

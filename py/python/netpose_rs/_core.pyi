@@ -134,7 +134,7 @@ class Estimate:
     def sigma_px(self) -> npt.NDArray[np.float64]:
         """(N,) one standard deviation of each junction's pixel, each axis, px."""
     @property
-    def states(self) -> list[Literal["seen", "hidden", "fouled", "missing"]]:
+    def states(self) -> list[Literal["seen", "hidden", "fouled", "missing", "inferred"]]:
         """What is known of each of the ``junctions``."""
     @property
     def track(self) -> int:

@@ -59,6 +59,7 @@ pub fn draw(folder: &Path, sample: &Sample, adjuster: &NetAdjuster, suffix: &str
             JunctionState::Hidden => [80, 80, 255],
             JunctionState::Fouled => [0, 160, 60],
             JunctionState::Missing => [255, 0, 0],
+            JunctionState::Inferred => [160, 160, 0],
         };
         for arm in [Vector2::new(1.5, 0.0), Vector2::new(0.0, 1.5)] {
             line(&mut canvas, junction.pixel - arm, junction.pixel + arm, colour);

@@ -2,6 +2,7 @@ use net_geometry::nalgebra::Matrix2;
 use net_geometry::{Junction, JunctionState};
 use net_image::GrayView;
 
+use crate::adjust::between;
 use crate::adjust::config::AdjustConfig;
 use crate::adjust::graph::{Graph, lower, median};
 use crate::adjust::grow::{Grower, Warped};
@@ -83,7 +84,7 @@ impl NetAdjuster {
         })
     }
 
-    /// The junctions that a predicted lattice has in the picture, with their lattice indices: those that are seen, hidden, overgrown or missing. Nodes
+    /// The junctions that a predicted lattice has in the picture, with their lattice indices: those that are seen, hidden, overgrown or missing, or lie between seen ones. Other nodes
     /// of which the picture says nothing are left out; so is everything where twine does not stand out from lines half a cell aside.
     ///
     /// # Errors
@@ -224,6 +225,7 @@ impl NetAdjuster {
             let either = |state: TwineState| any(0, state) || any(1, state);
             let missing = twines.iter().flatten().flatten().filter(|t| t.state == TwineState::Missing).count();
             let known = twines.iter().flatten().flatten().count();
+            let mut open = 1.0;
             let state = if self.witnesses.saw(k) {
                 JunctionState::Seen
             } else if either(TwineState::Hidden) {
@@ -232,11 +234,16 @@ impl NetAdjuster {
                 JunctionState::Fouled
             } else if missing == known && known >= 3 {
                 JunctionState::Missing
+            } else if let Some(steps) = between::steps(&self.graph, k, &self.presence.twines, |n| {
+                self.witnesses.saw(n) && self.spreader.named(n)
+            }) {
+                open = steps;
+                JunctionState::Inferred
             } else {
                 continue;
             };
             // Without measurements a node is known as well as its neighbours predict it.
-            let prior = Matrix2::identity() / (self.config.jitter_cells * node.height + 0.1).powi(2);
+            let prior = Matrix2::identity() / (open * (self.config.jitter_cells * node.height + 0.1).powi(2));
             let covariance =
                 (self.solver.information[k].cast::<f64>() + prior).try_inverse().unwrap_or_else(Matrix2::identity);
             let shading = SHADING * self.twine_m * node.scale;

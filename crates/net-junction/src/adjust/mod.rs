@@ -2,6 +2,7 @@
 
 mod adjuster;
 mod appearance;
+mod between;
 mod blocks;
 mod config;
 mod covered;

@@ -202,6 +202,7 @@ fn annotations(row: &PoseRow, junctions: &[Junction], timestamp: Timestamp) -> I
             JunctionState::Hidden => color(0.5, 0.5, 0.5, 1.0),
             JunctionState::Fouled => color(0.9, 0.7, 0.1, 1.0),
             JunctionState::Missing => color(1.0, 0.1, 0.1, 1.0),
+            JunctionState::Inferred => color(0.1, 0.9, 0.2, 0.4),
         };
         points.push(PointsAnnotation {
             timestamp,

@@ -112,7 +112,13 @@ fn read_group(reader: &SerializedFileReader<File>, index: usize) -> parquet::err
         .map(|row| {
             let index = if indexed.get(row) == Some(&1) { indices.next() } else { None };
             let word = state[row].as_utf8()?;
-            let states = [JunctionState::Seen, JunctionState::Hidden, JunctionState::Fouled, JunctionState::Missing];
+            let states = [
+                JunctionState::Seen,
+                JunctionState::Hidden,
+                JunctionState::Fouled,
+                JunctionState::Missing,
+                JunctionState::Inferred,
+            ];
             let state = states.into_iter().find(|s| s.as_str() == word);
             let state = state.ok_or_else(|| ParquetError::General(format!("state {word:?} is not known")))?;
             let frame =
