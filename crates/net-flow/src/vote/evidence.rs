@@ -5,9 +5,9 @@ use super::{LISTED, ShiftScore, Verdict, VoteConfig, VoteResult};
 /// What a frame says of a shift for which it had too few common cells, deviations: against it.
 const UNSEEN: f64 = -3.0;
 
-/// How far the best shift must stand out from a second that is beyond chance itself. Chance does not add up over frames: then something in the pictures repeats with other steps than the
-/// net's, as another net behind does, and the best may be one of its.
-const REPEATING_RATIO: f64 = 2.0;
+/// How many times as far as a second that is beyond chance itself the best shift of several frames must stand out. Chance does not add up over frames: then something in the pictures repeats
+/// with other steps than the net's, as another net behind does, and the best may be one of its.
+const REPEATING_RATIO: f64 = 1.75;
 
 /// Sums over undecided frames. Owns its buffers.
 #[derive(Debug)]
@@ -68,7 +68,8 @@ impl Evidence {
             }
         }
         let (first, second) = (best[0].z, best[1].z);
-        let ratio = if second > self.min_z { self.min_ratio.max(REPEATING_RATIO) } else { self.min_ratio };
+        let repeats = count > 1 && second > self.min_z;
+        let ratio = if repeats { self.min_ratio.max(REPEATING_RATIO) } else { self.min_ratio };
         let decided = first > self.min_z && first > ratio * second;
         VoteResult {
             verdict: if decided { Verdict::Decided } else { Verdict::Ambiguous },
@@ -93,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_repeats_with_other_steps_must_be_outdone_twice() {
+    fn what_repeats_with_other_steps_must_be_outdone_by_more() {
         let config = VoteConfig::default();
         let after = |best: f64, second: f64, looks: usize| {
             let mut evidence = Evidence::new(&config);

@@ -45,7 +45,7 @@ pub struct VoteConfig {
     pub reach_cells: usize,
     /// Combined deviations by which the best shift must stand out, 3 to 100. Default 5.
     pub min_z: f64,
-    /// And so many times as far as the second, 1 to 10; twice at least where the second stands out by `min_z` as well. Default 1.5.
+    /// And so many times as far as the second, 1 to 10; over several frames 1.75 times at least where the second stands out by `min_z` as well. Default 1.5.
     pub min_ratio: f64,
     /// Undecided frames whose evidence is added up, 1 to 32. Default 16: more than a fish takes to pass.
     pub memory_frames: usize,
