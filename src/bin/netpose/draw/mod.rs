@@ -134,7 +134,7 @@ mod tests {
             sigma_px: 0.1,
             state: JunctionState::Seen,
         };
-        let twine = |k: i32, state| Twine { index: (k, 0), direction: 0, state, llr: 0.0, contrast: 5.0 };
+        let twine = |k: i32, state| Twine { index: (k, 0), direction: 0, state, llr: 0.0, contrast: 5.0, width_px: None };
         let twines = &[twine(0, netpose::TwineState::Present), twine(1, netpose::TwineState::Missing)];
         let junctions = &[knot(0), knot(1), knot(2)];
         let shown = Shown { status: Status::Ok, probability: 0.9, net: None, junctions, twines, latency_ms: 5.0 };
