@@ -159,6 +159,21 @@ fn a_truth_that_is_no_pose_is_not_taken_for_no_net() {
     assert_status(&eval(",,,,,,"), 0);
 }
 
+/// `truth_layers.csv` has a row for each net: which of them is meant is not for the program to guess.
+#[test]
+fn a_truth_with_two_rows_for_a_frame_is_refused() {
+    let scratch = Scratch::new();
+    scratch.image_log(2, 48, 32);
+    assert_status(&scratch.run(&[]), 0);
+    let text =
+        "frame,file,tx,ty,tz,qw,qx,qy,qz\n0,f000.png,0,0,1,1,0,0,0\n1,f001.png,,,,,,,\n0,f000.png,0,0,2,1,0,0,0\n";
+    let truth = scratch.write("layers.csv", text);
+    let output =
+        netpose().arg("eval").arg(scratch.path("out")).arg("--truth").arg(truth).output().expect("netpose starts");
+    assert_status(&output, 1);
+    assert_says(&output, &["layers.csv, line 4", "frame 0 is in line 2 already"]);
+}
+
 #[test]
 fn pictures_of_one_name_are_not_drawn_over_each_other() {
     let scratch = Scratch::new();

@@ -31,7 +31,7 @@ fn every_frame_gets_a_row_in_the_logs_order() {
     assert_eq!(record["finished"], true);
     assert_eq!(record["frames"]["no_net"], 5);
     assert_eq!(record["mesh"], "50mm");
-    for name in ["junctions.parquet", "trajectory.tum", "annotated.mcap", "report.html"] {
+    for name in ["junctions.parquet", "twines.parquet", "trajectory.tum", "annotated.mcap", "report.html"] {
         assert!(scratch.path("out").join(name).is_file(), "{name}");
     }
     assert!(stdout(&output).starts_with("5 frames: "), "{}", stdout(&output));

@@ -35,6 +35,14 @@ fn poses_without(scratch: &Scratch, out: &str, columns: &[usize]) -> Vec<Vec<Str
     text.lines().map(cells).collect()
 }
 
+/// Frames and twines of `twines.parquet`.
+fn twines(scratch: &Scratch, out: &str) -> Vec<(u64, Vec<net_geometry::Twine>)> {
+    let frames = net_log::read_twines(&scratch.path(out).join("twines.parquet")).expect("a table that is whole");
+    let frames: Vec<_> = frames.map(|frame| frame.expect("a frame")).collect();
+    assert_eq!(frames.iter().map(|f| f.0).collect::<Vec<_>>(), [0, 1, 2]);
+    frames
+}
+
 const FILE: usize = 1;
 const LATENCY: usize = 21;
 
@@ -62,11 +70,19 @@ fn a_virtual_net_is_found_where_it_is() {
     assert!(report["normal_deg"]["max"].as_f64().unwrap() < 1.0, "{report}");
     assert!(report["lateral_mm"]["max"].as_f64().unwrap() < 10.0, "{report}");
 
+    // Twines have names that junctions have, and are as wide as blur of a pixel makes 2 mm at 1.2 m.
+    for (number, twines) in twines(&scratch, "out") {
+        let told: Vec<f32> = twines.iter().filter_map(|t| t.width_px).collect();
+        let mean = told.iter().sum::<f32>() / told.len() as f32;
+        assert!(twines.len() > 500 && 2 * told.len() > twines.len(), "{number}: {} of {}", told.len(), twines.len());
+        assert!((1.5..5.0).contains(&mean), "{number}: {mean}");
+    }
+
     // The same for any number of threads, to the byte, but for the time it took (which annotated.mcap carries as well).
     for jobs in ["2", "3"] {
         run(&scratch, "log", "again", &["--jobs", jobs, "--overlay", "--force"]);
         assert_eq!(poses_without(&scratch, "out", &[LATENCY]), poses_without(&scratch, "again", &[LATENCY]));
-        for name in ["junctions.parquet", "trajectory.tum"] {
+        for name in ["junctions.parquet", "twines.parquet", "trajectory.tum"] {
             let read = |out: &str| std::fs::read(scratch.path(out).join(name)).unwrap();
             assert!(read("out") == read("again"), "{name} differs for --jobs {jobs}");
         }
@@ -86,6 +102,8 @@ fn a_resumed_run_starts_another_count_of_cells() {
     run(&scratch, "log", "out", &["--resume"]);
     let tracks: Vec<String> = poses_without(&scratch, "out", &[]).iter().map(|row| row[track].clone()).collect();
     assert_eq!(tracks, ["track", "0", "1", "1"]);
+    // The twines of the frames that were done again are there once.
+    assert!(twines(&scratch, "out").iter().all(|(_, twines)| twines.len() > 500));
 }
 
 #[test]

@@ -77,6 +77,7 @@ mod plane;
 mod pnp;
 mod pose;
 mod region;
+mod twine;
 
 pub use angles::ZyxAngles;
 pub use basis::{Basis, WaveVector};
@@ -93,5 +94,6 @@ pub use nearest::NearestPoints;
 pub use plane::Plane;
 pub use pnp::{PlanarPose, planar_pnp};
 pub use pose::Pose;
+pub use twine::{Twine, TwineState};
 
 pub use nalgebra;

@@ -29,11 +29,11 @@
 //! | order of times | every kind of log | a time that does not come after that of the frame before: that frame; where one frame is ahead of all around it, it is that one |
 //! | pictures | JPEG, PNG, TIFF, BMP, WebP, told by their bytes; 8 and 16 bits, grey, colour, alpha; raw pixels with any row step | cut off, or a size that is beyond the limit, before memory is asked for: that frame |
 //! | cameras | ROS `camera_info` and Kalibr YAML ([`read_camera`]); `CameraInfo` and `CameraCalibration` in the log ([`LogInfo::camera`]), with binning, window and rectified images | unknown model, wrong number of coefficients, NaN, skew, zero focal length, a lens that takes nothing into the picture, never calibrated, several cameras: [`Error::Calibration`] names file or topic, field and value |
-//! | results | `poses.csv`, `junctions.parquet`, `run.json` ([`read_poses`], [`read_junctions`], [`RunSummary::read`]) | a row that does not parse: [`Error::Table`] with its line. A last line that was never finished is left out |
+//! | results | `poses.csv`, `junctions.parquet`, `twines.parquet`, `run.json` ([`read_poses`], [`read_junctions`], [`read_twines`], [`RunSummary::read`]) | a row that does not parse: [`Error::Table`] with its line. A last line that was never finished is left out |
 //!
 //! # Writing results
 //! [`RunFiles`] writes the folder of a run frame by frame, and goes on with one that was stopped. `poses.csv` is whole after every frame,
-//! `junctions.parquet` after every 256 at the most; [`RunFiles::finish`] derives `annotated.mcap`, [`write_report`] the page, and
+//! `junctions.parquet` and `twines.parquet` after every 256 at the most; [`RunFiles::finish`] derives `annotated.mcap`, [`write_report`] the page, and
 //! [`RunSummary`] is `run.json`. `docs/files.md` describes them column by column. [`ImageFolderWriter`] and [`ImageMcapWriter`] write
 //! logs that [`open`] reads back. Errors name the path.
 //!
@@ -57,8 +57,9 @@ pub use error::{Error, Result};
 pub use frame::{FrameError, RawFrame, read_image};
 pub use log::{CameraInLog, Log, LogInfo, LogKind, OpenOptions, TimeBound, TimeSource, TopicInfo, inspect, open};
 pub use sink::{
-    AnnotatedMcap, DEFAULT_CAMERA_FRAME, Example, GrowthParquet, GrowthRow, ImageFolderWriter, ImageMcapWriter,
-    Junctions, JunctionsParquet, LogSummary, NetColumns, POSES_HEADER, PoseRow, PoseRows, PosesCsv, Resumed, RowStatus,
-    RunFiles, RunPaths, RunSummary, Timing, TimingHistogram, TrajectoryTum, UnreadableFrame, png, read_junctions,
-    read_poses, write_camera_yaml, write_report,
+    AnnotatedMcap, DEFAULT_CAMERA_FRAME, Example, FrameRow, Frames, FramesParquet, GrowthParquet, GrowthRow,
+    ImageFolderWriter, ImageMcapWriter, Junctions, JunctionsParquet, Knots, LogSummary, NetColumns, POSES_HEADER,
+    PoseRow, PoseRows, PosesCsv, Resumed, RowStatus, RunFiles, RunPaths, RunSummary, Timing, TimingHistogram,
+    TrajectoryTum, Twines, TwinesParquet, UnreadableFrame, png, read_junctions, read_poses, read_twines,
+    write_camera_yaml, write_report,
 };

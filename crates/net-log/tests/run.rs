@@ -6,11 +6,11 @@ mod support;
 use std::path::Path;
 
 use net_geometry::nalgebra::{Rotation3, Vector2, Vector3};
-use net_geometry::{Camera, Junction, JunctionState, Lens, Pose};
+use net_geometry::{Camera, Junction, JunctionState, Lens, Pose, Twine, TwineState};
 use net_log::{
     DEFAULT_CAMERA_FRAME, Example, ImageFolderWriter, ImageMcapWriter, JunctionsParquet, NetColumns, OpenOptions,
-    PoseRow, RowStatus, RunFiles, RunSummary, open, read_camera, read_junctions, read_poses, write_camera_yaml,
-    write_report,
+    PoseRow, RowStatus, RunFiles, RunSummary, TwinesParquet, open, read_camera, read_junctions, read_poses,
+    read_twines, write_camera_yaml, write_report,
 };
 use proptest::prelude::*;
 use support::{picture, png};
@@ -37,6 +37,25 @@ fn junctions(frame: u64, count: usize) -> Vec<Junction> {
         state: states[n % states.len()],
     };
     (0..count).map(junction).collect()
+}
+
+/// `count` twines, every third with a width; numbers as the file has them, in parts of 64.
+fn twines(frame: u64, count: usize) -> Vec<Twine> {
+    let twine = |n: usize| Twine {
+        index: (n as i32 - 5, frame as i32),
+        direction: n % 2,
+        state: TwineState::ALL[n % 6],
+        llr: n as f32 / 64.0 - 3.0,
+        contrast: 5.0 + frame as f32 / 64.0,
+        width_px: n.is_multiple_of(3).then_some(2.5 + n as f32 / 64.0),
+    };
+    (0..count).map(twine).collect()
+}
+
+/// The twines of a frame of [`frame`]: now and then none, though there are junctions.
+fn twines_of(index: u64) -> Vec<Twine> {
+    let junctions = frame(index).1.len();
+    twines(index, if index.is_multiple_of(7) { 0 } else { 2 * junctions })
 }
 
 /// A run of frames of every status.
@@ -72,15 +91,19 @@ fn frame(index: u64) -> (PoseRow, Vec<Junction>) {
 fn write(files: &mut RunFiles, frames: std::ops::Range<u64>) {
     for index in frames {
         let (row, junctions) = frame(index);
-        files.write(&row, &junctions).unwrap();
+        files.write(&row, &junctions, &twines_of(index)).unwrap();
     }
 }
 
-/// Contents of all files that a run has, junctions as rows.
-fn contents(dir: &Path) -> (String, String, Vec<(u64, Vec<Junction>)>) {
+/// The frames of a table and their rows.
+type Rows<T> = Vec<(u64, Vec<T>)>;
+
+/// Contents of all files that a run has, junctions and twines as rows.
+fn contents(dir: &Path) -> (String, String, Rows<Junction>, Rows<Twine>) {
     let text = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
     let junctions = read_junctions(&dir.join("junctions.parquet")).unwrap().map(Result::unwrap).collect();
-    (text("poses.csv"), text("trajectory.tum"), junctions)
+    let twines = read_twines(&dir.join("twines.parquet")).unwrap().map(Result::unwrap).collect();
+    (text("poses.csv"), text("trajectory.tum"), junctions, twines)
 }
 
 #[test]
@@ -117,13 +140,55 @@ fn junctions_read_back_frame_by_frame() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left beside it");
 }
 
+#[test]
+fn twines_read_back_frame_by_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("twines.parquet");
+    let mut writer = TwinesParquet::create(&path).unwrap();
+    assert_eq!(read_twines(&path).unwrap().last_frame(), None);
+    let count = |frame: u64| if frame.is_multiple_of(3) { 0 } else { 2000 };
+    for frame in 0..100 {
+        writer.write(frame, &twines(frame, count(frame))).unwrap();
+    }
+    writer.finish().unwrap();
+    // A frame without twines is known to have none.
+    assert_eq!(read_twines(&path).unwrap().last_frame(), Some(99));
+    let mut expected = (0..100).filter(|f: &u64| count(*f) > 0);
+    for frame in read_twines(&path).unwrap() {
+        let (number, found) = frame.unwrap();
+        assert_eq!(Some(number), expected.next());
+        assert_eq!(found, twines(number, count(number)));
+    }
+    assert_eq!(expected.next(), None);
+    assert!(read_junctions(&path).err().unwrap().to_string().contains("its columns are not frame, u, v"));
+    let bytes = std::fs::metadata(&path).unwrap().len();
+    assert!(bytes < 66 * 2000 * 12, "{bytes} bytes: not more than a dozen for a twine");
+}
+
+/// A table of twines that was lost, or that another version left out, is made anew with all else that it belongs to.
+#[test]
+fn frames_whose_twines_are_lost_are_done_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut files = RunFiles::create(dir.path(), &[]).unwrap();
+    write(&mut files, 0..20);
+    files.finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+    let whole = contents(dir.path());
+    std::fs::remove_file(dir.path().join("twines.parquet")).unwrap();
+    let (mut files, rows) = RunFiles::resume(dir.path(), &[]).unwrap();
+    // The first of the frames has no junctions.
+    assert_eq!(rows.len(), 1);
+    write(&mut files, 1..20);
+    files.finish(&camera(Lens::None), DEFAULT_CAMERA_FRAME).unwrap();
+    assert_eq!(contents(dir.path()), whole);
+}
+
 /// A write that fails half-way, as on a full disk or when the process is killed in it.
 #[test]
 fn a_group_torn_in_the_middle_costs_that_group_only() {
     let dir = tempfile::tempdir().unwrap();
     let mut files = RunFiles::create(dir.path(), &[]).unwrap();
     let rows: Vec<_> = (0..600_u64).map(|i| frame(5 * i)).collect();
-    rows.iter().for_each(|(row, junctions)| files.write(row, junctions).unwrap());
+    rows.iter().for_each(|(row, junctions)| files.write(row, junctions, &[]).unwrap());
     drop(files);
     let path = dir.path().join("junctions.parquet");
     let kept = read_junctions(&path).unwrap().count();
@@ -145,11 +210,11 @@ fn what_may_not_be_written() {
     let dir = tempfile::tempdir().unwrap();
     let mut files = RunFiles::create(dir.path(), &[]).unwrap();
     let (row, _) = frame(1);
-    let text = files.write(&row, &junctions(1, 2)).unwrap_err().to_string();
+    let text = files.write(&row, &junctions(1, 2), &[]).unwrap_err().to_string();
     assert!(text.contains("Some(13) in the row and 2 in the list"), "{text}");
     let mut nan = junctions(1, 13);
     nan[3].pixel.x = f64::NAN;
-    assert!(files.write(&row, &nan).unwrap_err().to_string().contains("junction is (NaN, "));
+    assert!(files.write(&row, &nan, &[]).unwrap_err().to_string().contains("junction is (NaN, "));
     let file = dir.path().join("a file");
     std::fs::write(&file, "").unwrap();
     let text = RunFiles::create(&file, &[]).unwrap_err().to_string();
@@ -306,7 +371,7 @@ proptest! {
     /// A run that is stopped after any frame, by a signal (its files closed) or by force (not closed), and whose files then lose any
     /// number of bytes at their ends, goes on to the same results as one that was never stopped.
     #[test]
-    fn stopped_anywhere(stop in 0..60_u64, closed: bool, lost in prop::collection::vec(0..300_u64, 3), grouped: bool) {
+    fn stopped_anywhere(stop in 0..60_u64, closed: bool, lost in prop::collection::vec(0..300_u64, 4), grouped: bool) {
         let (whole, torn) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let mut files = RunFiles::create(whole.path(), &[]).unwrap();
         write(&mut files, 0..60);
@@ -319,7 +384,7 @@ proptest! {
         } else {
             drop(files);
         }
-        for (name, lost) in ["poses.csv", "trajectory.tum", "junctions.parquet"].iter().zip(&lost) {
+        for (name, lost) in ["poses.csv", "trajectory.tum", "junctions.parquet", "twines.parquet"].iter().zip(&lost) {
             let file = std::fs::OpenOptions::new().write(true).open(torn.path().join(name)).unwrap();
             let length = file.metadata().unwrap().len();
             file.set_len(length.saturating_sub(if grouped { *lost } else { 0 })).unwrap();
@@ -339,6 +404,28 @@ proptest! {
         prop_assert_eq!(annotated(torn.path()), annotated(whole.path()));
         let names = |dir: &Path| std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name()).collect::<std::collections::BTreeSet<_>>();
         prop_assert_eq!(names(torn.path()), names(whole.path()));
+    }
+
+    /// Any bytes: an error, or twines; never a panic.
+    #[test]
+    fn any_bytes_of_twines(cut in 0.0..1.1f64, changes in prop::collection::vec((0.0..1.0f64, any::<u8>()), 0..5)) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("twines.parquet");
+        let mut writer = TwinesParquet::create(&path).unwrap();
+        (0..4).for_each(|f| writer.write(f, &twines(f, 20)).unwrap());
+        writer.finish().unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        for (at, byte) in changes {
+            let at = (at * bytes.len() as f64) as usize;
+            bytes[at] = byte;
+        }
+        bytes.truncate((cut * bytes.len() as f64) as usize);
+        std::fs::write(&path, bytes).unwrap();
+        if let Ok(frames) = read_twines(&path) {
+            for (_, found) in frames.map_while(Result::ok) {
+                prop_assert!(!found.is_empty());
+            }
+        }
     }
 
     /// Any bytes: an error, or junctions; never a panic.

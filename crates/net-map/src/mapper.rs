@@ -72,18 +72,16 @@ impl<S: TileStore> Mapper<S> {
             }
             cell.frames = cell.frames.saturating_add(1);
             cell.last = frame.number;
-            if let Some(blocked) = view.blocked {
-                if view.px >= config.growth_min_px {
-                    cell.blocked += blocked;
-                    cell.blocked_frames += 1;
-                }
-                // Near and unhidden is best; a hidden cell is better than none.
-                if view.px as f32 > cell.best_px {
-                    cell.best_px = view.px as f32;
-                    cell.best_depth_m = view.depth_m as f32;
-                    cell.contrast = view.contrast;
-                    cell.patch = view.patch;
-                }
+            if let Some(blocked) = view.blocked.filter(|_| view.px >= config.growth_min_px) {
+                cell.blocked += blocked;
+                cell.blocked_frames += 1;
+            }
+            // Near and unhidden is best; a hidden cell is better than none.
+            if !view.hidden && view.px as f32 > cell.best_px {
+                cell.best_px = view.px as f32;
+                cell.best_depth_m = view.depth_m as f32;
+                cell.contrast = view.contrast;
+                cell.patch = view.patch;
             } else if cell.best_px == 0.0 {
                 cell.patch = view.patch;
             }

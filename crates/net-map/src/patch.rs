@@ -7,17 +7,26 @@ use net_image::GrayView;
 
 use crate::frame::{NetView, Seen, TwineLook, in_reach};
 use crate::tile::{PATCH, SAMPLES};
+use crate::water::{Around, Water};
 
-/// Cells to each side over which water and twine are compared.
-const RADIUS: i32 = 4;
 /// Largest span of cells in view along either direction: more is no view of a net.
 const MAX_SPAN: u32 = 512;
 /// Grey levels of the mosaic from water to twine.
 const SWING: f32 = 90.0;
-/// Part of twine's contrast beyond which a sample is blocked: half, where a blurred edge lies.
-const BLOCKED: f32 = 0.5;
 /// Share of a cell's samples that are surely no brighter or darker than its twine: the rest, thin twine covers.
 const TWINE_QUANTILE: f32 = 0.95;
+/// That quantile, and the median, of what is as far from zero as normal noise, deviations.
+const NORMAL_TWINE: f32 = 1.96;
+const NORMAL_MEDIAN: f32 = 0.6745;
+/// As far as cells are usually off the water around them, times this, a cell is believed to show other water and no growth.
+const OWN: f32 = 2.5;
+/// Least contrast of twine of which anything is said: grey levels, and deviations of the noise. Below, a third of the noise and more would have to be taken off.
+const LEAST: (f32, f32) = (2.0, 4.0);
+/// Deviation of the logarithm of contrast from cell to cell above which nothing is said. Nets have 0.1 to 0.3, under growth too; moving light makes 0.3 to 1, and
+/// there neighbours do not tell what twine looks like.
+const UNEVEN: f32 = 0.3;
+/// Parts that half of the normal distribution is cut into where its share of what is blocked is summed.
+const PARTS: usize = 16;
 
 /// A cell in view.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,8 +37,10 @@ pub(crate) struct View {
     pub depth_m: f64,
     /// How far twine stands out hereabouts, grey levels.
     pub contrast: f32,
-    /// Blocked share; `None` where something hides the cell, or no twine stands out.
+    /// Blocked share; `None` where something hides the cell, or twine does not stand out enough to tell.
     pub blocked: Option<f32>,
+    /// Something lies before it.
+    pub hidden: bool,
     pub patch: [u8; SAMPLES],
 }
 
@@ -41,16 +52,21 @@ pub(crate) struct Patches {
     samples: Vec<[f32; SAMPLES]>,
     /// Cell, height, depth of each.
     seen: Vec<((i32, i32), f64, f64)>,
-    /// Number of the cell at a place of the span, less its corner.
-    grid: Vec<u32>,
-    water: Vec<f32>,
+    around: Around,
+    /// By cell: the middle of its opening, and how far that is off the water around.
+    opening: Vec<f32>,
+    off: Vec<f32>,
+    water: Vec<Water>,
+    /// By cell: deviation of the samples in its opening, and how far its twine is off the water.
+    spread: Vec<f32>,
+    reach: Vec<f32>,
+    /// By cell: how far it is off its neighbours in what is compared.
+    apart: Vec<f32>,
+    noise: Vec<f32>,
     swing: Vec<f32>,
-    around: Vec<f32>,
+    uneven: Vec<f32>,
     sorted: Vec<f32>,
 }
-
-/// No cell here.
-const NONE: u32 = u32::MAX;
 
 impl Patches {
     /// Lays out every cell in view that lies in the picture as a whole.
@@ -81,17 +97,21 @@ impl Patches {
         self.sample(image, view);
         self.compare();
         for (k, &(cell, px, depth_m)) in self.seen.iter().enumerate() {
-            let (water, swing) = (self.water[k], self.swing[k].max(1.0));
-            let samples = &self.samples[k];
-            let blocked = samples.iter().filter(|v| (**v - water).abs() > BLOCKED * swing).count();
-            let told = !self.hidden.contains(&cell) && self.swing[k] > 2.0;
+            let (swing, noise) = (self.swing[k], self.noise[k]);
+            let (samples, water) = (&self.samples[k], &self.water[k]);
+            let off: [f32; SAMPLES] = std::array::from_fn(|s| samples[s] - water.at(s % PATCH, s / PATCH));
+            let hidden = self.hidden.contains(&cell);
+            let told = !hidden && swing > LEAST.0.max(LEAST.1 * noise) && self.uneven[k] < UNEVEN;
+            // Where noise is all there is, it shall not look like a net.
+            let scale = SWING / swing.max(3.0 * noise).max(1.0);
             each(View {
                 cell,
                 px,
                 depth_m,
-                contrast: self.swing[k],
-                blocked: told.then_some(blocked as f32 / SAMPLES as f32),
-                patch: std::array::from_fn(|s| (128.0 + SWING * (samples[s] - water) / swing).clamp(1.0, 255.0) as u8),
+                contrast: swing,
+                blocked: told.then(|| blocked(&off, swing, noise)),
+                hidden,
+                patch: off.map(|v| (128.0 + scale * v).clamp(1.0, 255.0) as u8),
             });
         }
     }
@@ -129,58 +149,109 @@ impl Patches {
         }
     }
 
-    /// Level of the water and contrast of the twine, medians over the neighbourhood: fish and haze do not count, and slow changes of light go.
+    /// Level of the water, contrast of the twine and noise, compared over the neighbourhood: fish, haze and growth do not count, and slow changes of light go.
     fn compare(&mut self) {
-        let least = self.seen.iter().fold((i32::MAX, i32::MAX), |l, (c, ..)| (l.0.min(c.0), l.1.min(c.1)));
-        let most = self.seen.iter().fold((i32::MIN, i32::MIN), |l, (c, ..)| (l.0.max(c.0), l.1.max(c.1)));
-        let (columns, rows) = if self.seen.is_empty() { (0, 0) } else { (most.0 - least.0 + 1, most.1 - least.1 + 1) };
-        self.grid.clear();
-        self.grid.resize((columns * rows) as usize, NONE);
-        for (k, (cell, ..)) in self.seen.iter().enumerate() {
-            self.grid[((cell.1 - least.1) * columns + cell.0 - least.0) as usize] = k as u32;
-        }
-        let quantile = |values: &mut Vec<f32>, q: f32| {
-            let at = ((values.len() - 1) as f32 * q) as usize;
-            *values.select_nth_unstable_by(at, f32::total_cmp).1
-        };
+        let Self {
+            seen, samples, around, opening, off, water, spread, reach, apart, noise, swing, uneven, sorted, ..
+        } = self;
+        around.index(seen, &self.hidden);
         // Each cell's water is the middle of its opening.
-        let inner = PATCH / 4..PATCH - PATCH / 4;
-        let raw: Vec<f32> = self
-            .samples
-            .iter()
-            .map(|patch| {
-                self.sorted.clear();
-                self.sorted.extend(inner.clone().flat_map(|y| inner.clone().map(move |x| patch[y * PATCH + x])));
-                quantile(&mut self.sorted, 0.5)
-            })
-            .collect();
-        let median_around = |values: &[f32], grid: &[u32], seen: &[((i32, i32), f64, f64)], around: &mut Vec<f32>| {
-            seen.iter()
-                .map(|(cell, ..)| {
-                    around.clear();
-                    for j in (cell.1 - RADIUS).max(least.1)..=(cell.1 + RADIUS).min(most.1) {
-                        for i in (cell.0 - RADIUS).max(least.0)..=(cell.0 + RADIUS).min(most.0) {
-                            let k = grid[((j - least.1) * columns + i - least.0) as usize];
-                            if k != NONE {
-                                around.push(values[k as usize]);
-                            }
-                        }
-                    }
-                    quantile(around, 0.5)
-                })
-                .collect::<Vec<f32>>()
+        let inner = || (PATCH / 4..PATCH - PATCH / 4).flat_map(|y| (PATCH / 4..PATCH - PATCH / 4).map(move |x| (x, y)));
+        let mut quantile_of = |values: &mut dyn Iterator<Item = f32>, q: f32| {
+            sorted.clear();
+            sorted.extend(values);
+            quantile(sorted, q)
         };
-        self.water = median_around(&raw, &self.grid, &self.seen, &mut self.around);
-        let swing: Vec<f32> = self
-            .samples
-            .iter()
-            .zip(&self.water)
-            .map(|(patch, water)| {
-                self.sorted.clear();
-                self.sorted.extend(patch.iter().map(|v| (v - water).abs()));
-                quantile(&mut self.sorted, TWINE_QUANTILE)
+        opening.clear();
+        opening.extend(samples.iter().map(|patch| quantile_of(&mut inner().map(|(x, y)| patch[y * PATCH + x]), 0.5)));
+        water.clear();
+        off.clear();
+        apart.clear();
+        for (k, (cell, ..)) in seen.iter().enumerate() {
+            water.push(around.sheet(*cell, opening));
+            off.push(opening[k] - water[k].level(0.0, 0.0));
+            apart.push(off[k].abs());
+        }
+        spread.clear();
+        reach.clear();
+        for (k, patch) in samples.iter().enumerate() {
+            let usual = OWN * around.median(seen[k].0, apart) / NORMAL_MEDIAN;
+            let own = off[k].clamp(-usual, usual);
+            water[k].raise(own);
+            let (water, rest) = (&water[k], off[k] - own);
+            let from_water = |(x, y): (usize, usize)| patch[y * PATCH + x] - water.at(x, y);
+            spread.push(quantile_of(&mut inner().map(|s| (from_water(s) - rest).abs()), 0.5) / NORMAL_MEDIAN);
+            let all = &mut (0..SAMPLES).map(|s| from_water((s % PATCH, s / PATCH)).abs());
+            reach.push(quantile_of(all, TWINE_QUANTILE));
+        }
+        noise.clear();
+        for (k, (cell, ..)) in seen.iter().enumerate() {
+            noise.push(around.median(*cell, spread));
+            // Noise alone reaches so far.
+            reach[k] = (reach[k].powi(2) - (NORMAL_TWINE * noise[k]).powi(2)).max(0.01).sqrt();
+        }
+        swing.clear();
+        swing.extend(seen.iter().map(|(cell, ..)| around.median(*cell, reach)));
+        apart.clear();
+        apart.extend(reach.iter().zip(&*swing).map(|(own, around)| (own / around).ln().abs()));
+        uneven.clear();
+        uneven.extend(seen.iter().map(|(cell, ..)| around.median(*cell, apart) / NORMAL_MEDIAN));
+    }
+}
+
+/// Blocked share: how far the samples are off the water, in parts of twine's contrast, each part at most one. A blurred line counts as the sharp one. What noise brings to clear
+/// water is taken off.
+fn blocked(off: &[f32; SAMPLES], swing: f32, noise: f32) -> f32 {
+    let sum: f32 = off.iter().map(|v| (v.abs() / swing).min(1.0)).sum();
+    // The mean of a positive number is the integral over how often it is exceeded.
+    let exceeded = |k: usize| beyond_by_chance((k as f32 + 0.5) / PARTS as f32 * swing / noise.max(f32::MIN_POSITIVE));
+    let chance = (0..PARTS).map(exceeded).sum::<f32>() / PARTS as f32;
+    ((sum / SAMPLES as f32 - chance) / (1.0 - chance)).max(0.0)
+}
+
+/// Share of normal noise that is farther from zero than `x` deviations, to 3e-5: Abramowitz and Stegun 7.1.25.
+fn beyond_by_chance(x: f32) -> f32 {
+    let z = x / std::f32::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.470_47 * z);
+    t * (0.348_024_2 + t * (-0.095_879_8 + t * 0.747_855_6)) * (-z * z).exp()
+}
+
+/// Of no values 0.
+pub(crate) fn quantile(values: &mut [f32], q: f32) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as f32 * q) as usize;
+    *values.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twine on a fifth of a mesh counts as much with noise as without, whatever the noise, and blurred as much as sharp.
+    #[test]
+    fn noise_and_blur_leave_the_blocked_share() {
+        let mut state = 7_u64;
+        let mut normal = || {
+            // The sum of twelve uniform numbers.
+            (0..12).fold(-6.0, |sum, _| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                sum + (state >> 40) as f32 / (1 << 24) as f32
             })
-            .collect();
-        self.swing = median_around(&swing, &self.grid, &self.seen, &mut self.around);
+        };
+        for noise in [0.0, 1.0, 2.0] {
+            let mean = (0..200)
+                .map(|_| {
+                    let samples = std::array::from_fn(|s| if s % 5 == 0 { -9.0 } else { 0.0 } + noise * normal());
+                    blocked(&samples, 8.0, noise)
+                })
+                .sum::<f32>()
+                / 200.0;
+            assert!((mean - 0.2).abs() < 0.02, "{noise}: {mean}");
+        }
+        let blurred = std::array::from_fn(|s| if s % 5 < 2 { 4.0 } else { 0.0 });
+        assert!((blocked(&blurred, 8.0, 0.0) - 0.2).abs() < 0.01);
+        assert!(blocked(&[0.0; SAMPLES], 8.0, 1.0) == 0.0);
     }
 }

@@ -80,7 +80,7 @@ impl Cell {
         patch: [0; SAMPLES],
     };
 
-    /// Blocked share of the mesh in [0, 1], twine included; `None` if it was never seen from near enough.
+    /// Blocked share of the mesh in [0, 1], twine included; `None` if it was never seen from near enough, unhidden and well above noise.
     pub fn blocked_share(&self) -> Option<f32> {
         (self.blocked_frames > 0).then(|| self.blocked / self.blocked_frames as f32)
     }

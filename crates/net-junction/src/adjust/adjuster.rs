@@ -152,6 +152,7 @@ impl NetAdjuster {
         self.twine_m = look.twine_m;
         self.leave_out_unnamed();
         self.presence.claim(&self.graph, |n| self.witnesses.saw(n), &self.config);
+        self.presence.widths(&mut self.graph, &self.locator.profiles);
         self.report();
         Ok(&self.junctions)
     }

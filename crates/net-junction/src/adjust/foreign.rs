@@ -38,7 +38,7 @@ impl Foreign {
 }
 
 /// The twines of the same family on both sides of one.
-fn beside(graph: &Graph, edge: usize) -> [Option<usize>; 2] {
+pub(crate) fn beside(graph: &Graph, edge: usize) -> [Option<usize>; 2] {
     let edge = &graph.edges[edge];
     let (i, j) = graph.nodes[edge.nodes[0] as usize].index;
     let indices = if edge.family == 0 { [(i, j - 1), (i, j + 1)] } else { [(i - 1, j), (i + 1, j)] };

@@ -130,6 +130,11 @@ impl Lines {
         reduce(self, graph, profiles, means, appearance);
     }
 
+    /// Bins between the knots.
+    pub fn middle(&self) -> std::ops::Range<usize> {
+        self.middle.clone()
+    }
+
     fn window(&self) -> usize {
         self.middle.len().div_ceil(2)
     }

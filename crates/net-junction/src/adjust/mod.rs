@@ -23,6 +23,7 @@ mod spread;
 mod statistic;
 mod template;
 mod warp;
+mod width;
 
 pub use adjuster::NetAdjuster;
 pub use config::AdjustConfig;

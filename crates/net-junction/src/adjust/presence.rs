@@ -1,5 +1,6 @@
 //! Which twines are there: each against its neighbours, and against control lines half a cell aside where there is none.
 
+pub use net_geometry::{Twine, TwineState};
 use net_image::GrayView;
 
 use crate::adjust::appearance::Appearance;
@@ -12,6 +13,7 @@ use crate::adjust::outside::Outside;
 use crate::adjust::profile::{FINE_PX, Profiles};
 use crate::adjust::source::Source;
 use crate::adjust::statistic::{evidence, evidence_of_gap, vote};
+use crate::adjust::width::Widths;
 
 /// Least scatter of relative amplitudes, of twines and of control lines.
 const SCATTER_MIN: (f32, f32) = (0.06, 0.07);
@@ -33,39 +35,6 @@ const LEFT: (f32, f32) = (-0.45, 1.15);
 const ASTRAY: f32 = 0.5;
 /// Larger cells, px, may have more of it: stubs that hang from the knots are larger, and what lies before the net stands out better.
 const CLUTTER_CELL_PX: f32 = 9.0;
-
-/// What is known of a twine between two neighbouring nodes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum TwineState {
-    /// The picture does not tell.
-    #[default]
-    Unknown,
-    /// There.
-    Present,
-    /// Gone, or broken, for certain: together with what else looks gone around it.
-    Missing,
-    /// Looks gone, as some of a picture's thousands of twines do by chance. More pictures tell.
-    Doubtful,
-    /// Behind a fish or another object.
-    Hidden,
-    /// Overgrown.
-    Fouled,
-}
-
-/// A twine with the evidence for its state.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Twine {
-    /// Node at its first end.
-    pub index: (i32, i32),
-    /// 0: to node `(i + 1, j)`, 1: to `(i, j + 1)`.
-    pub direction: usize,
-    /// What is known of it.
-    pub state: TwineState,
-    /// Log likelihood ratio, present to missing.
-    pub llr: f32,
-    /// How many standard deviations the neighbourhood's twines stand out from the control lines.
-    pub contrast: f32,
-}
 
 /// What a twine that looks missing looks like.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -96,6 +65,7 @@ pub(crate) struct Presence {
     covered: Covered,
     foreign: Foreign,
     outside: Outside,
+    widths: Widths,
     /// By edge: what speaks for a gap where it looks missing.
     gaps: Vec<Gap>,
     /// By edge: log likelihood ratio, net to no net, of the whole twine by normal densities, limited; NaN outside the picture.
@@ -146,6 +116,13 @@ impl Presence {
     /// What looks gone is gone where it is certain.
     pub fn claim(&mut self, graph: &Graph, seen: impl Fn(usize) -> bool, config: &AdjustConfig) {
         self.outside.claim(graph, &mut self.twines, &self.gaps, seen, config);
+    }
+
+    /// Measures the twines' apparent widths. `profiles` are those that were judged.
+    pub fn widths(&mut self, graph: &mut Graph, profiles: &Profiles) {
+        let looks = [(profiles, &self.appearance.means), (&self.control_profiles, &self.control_means)];
+        let bins = self.twine.middle();
+        self.widths.measure(graph, looks, bins, &self.appearance, &self.levels, &mut self.twines);
     }
 
     fn decide(&mut self, graph: &mut Graph, profiles: &Profiles, config: &AdjustConfig) {
@@ -213,7 +190,7 @@ impl Presence {
             let contrast = if self.appearance.means.inside[e] { contrast.max(whole_contrast) } else { 0.0 };
             let vote = if known { vote(&self.twine.full, &self.control.full, e, block) } else { 0.0 };
             self.votes.push(if self.appearance.means.inside[e] { vote } else { f32::NAN });
-            self.twines.push(Twine { index, direction: edge.family, state, llr, contrast });
+            self.twines.push(Twine { index, direction: edge.family, state, llr, contrast, width_px: None });
         }
     }
 

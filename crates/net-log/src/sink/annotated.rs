@@ -2,7 +2,7 @@
 //!
 //! | topic | schema | what |
 //! |---|---|---|
-//! | `/netpose/annotations` | `foxglove.ImageAnnotations` | junctions by state, twines between neighbours, a line of text |
+//! | `/netpose/annotations` | `foxglove.ImageAnnotations` | junctions and twines coloured by state, a line of text |
 //! | `/netpose/pose` | `foxglove.PoseInFrame` | the net in the camera frame |
 //! | `/netpose/transform` | `foxglove.FrameTransform` | the same, as a child frame `net` of the camera's |
 //! | `/netpose/calibration` | `foxglove.CameraCalibration` | the camera, once |
@@ -10,6 +10,7 @@
 //!
 //! Log time is the frame's time, so that messages meet their image. Frames without a time are left out.
 
+mod knots;
 mod messages;
 
 use std::collections::{BTreeMap, HashMap};
@@ -19,12 +20,13 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use net_geometry::nalgebra::{UnitQuaternion, Vector2};
-use net_geometry::{Camera, Junction, JunctionState, Lens};
+use net_geometry::{Camera, Junction, JunctionState, Lens, Twine, TwineState};
 use prost::Message;
 use prost_types::Timestamp;
 
 use crate::error::{Error, Result};
 use crate::sink::poses::PoseRow;
+pub use knots::Knots;
 use messages::{
     CameraCalibration, Color, Estimate, FrameTransform, ImageAnnotations, LINE_LIST, POINTS, Point2, PointsAnnotation,
     Pose, PoseInFrame, Quaternion, TextAnnotation, Vector3,
@@ -83,18 +85,18 @@ impl AnnotatedMcap {
         Ok(this)
     }
 
-    /// Adds a frame.
+    /// Adds a frame. Without `twines`, of which not every method tells, neighbouring junctions are joined.
     ///
     /// # Errors
     /// [`Error::Io`] names the path.
-    pub fn write(&mut self, row: &PoseRow, junctions: &[Junction]) -> Result<()> {
+    pub fn write(&mut self, row: &PoseRow, junctions: &[Junction], twines: &[Twine]) -> Result<()> {
         let Some(ns) = row.timestamp_ns.filter(|&ns| ns >= 0) else { return Ok(()) };
         let timestamp = Timestamp { seconds: ns / 1_000_000_000, nanos: (ns % 1_000_000_000) as i32 };
         if let Some(camera) = self.camera.take() {
             let calibration = calibration(&camera, timestamp, &self.camera_frame);
             self.send("/netpose/calibration", ns, &calibration)?;
         }
-        self.send("/netpose/annotations", ns, &annotations(row, junctions, timestamp))?;
+        self.send("/netpose/annotations", ns, &annotations(row, junctions, twines, timestamp))?;
         self.send("/netpose/estimate", ns, &estimate(row, timestamp))?;
         let Some(net) = &row.net else { return Ok(()) };
         let (t, q) = (net.pose.translation, net.pose.quaternion());
@@ -193,7 +195,7 @@ fn color(r: f64, g: f64, b: f64, a: f64) -> Color {
     Color { r, g, b, a }
 }
 
-fn annotations(row: &PoseRow, junctions: &[Junction], timestamp: Timestamp) -> ImageAnnotations {
+fn annotations(row: &PoseRow, junctions: &[Junction], twines: &[Twine], timestamp: Timestamp) -> ImageAnnotations {
     let timestamp = Some(timestamp);
     let mut points = Vec::new();
     if !junctions.is_empty() {
@@ -213,15 +215,18 @@ fn annotations(row: &PoseRow, junctions: &[Junction], timestamp: Timestamp) -> I
             fill_color: None,
             thickness: 4.0,
         });
-        points.push(PointsAnnotation {
-            timestamp,
-            r#type: LINE_LIST,
-            points: twines(junctions),
-            outline_color: Some(color(0.1, 0.8, 0.9, 0.6)),
-            outline_colors: Vec::new(),
-            fill_color: None,
-            thickness: 1.0,
-        });
+        let mut by_state = lines(junctions, twines);
+        points.extend(STROKES.iter().filter_map(|&(state, [r, g, b, a], thickness)| {
+            Some(PointsAnnotation {
+                timestamp,
+                r#type: LINE_LIST,
+                points: by_state.remove(state.as_str())?,
+                outline_color: Some(color(r, g, b, a)),
+                outline_colors: Vec::new(),
+                fill_color: None,
+                thickness,
+            })
+        }));
     }
     let net = row.net.as_ref().map_or_else(String::new, |n| {
         format!("   range {:.3} m   tilt {:.1}°", n.range_m, n.pose.plane().tilt().to_degrees())
@@ -238,17 +243,82 @@ fn annotations(row: &PoseRow, junctions: &[Junction], timestamp: Timestamp) -> I
     ImageAnnotations { circles: Vec::new(), points, texts: vec![text] }
 }
 
-/// Ends of the twines between junctions that are neighbours in the lattice, two points each.
-fn twines(junctions: &[Junction]) -> Vec<Point2> {
-    let at: HashMap<(i32, i32), Vector2<f64>> = junctions.iter().filter_map(|j| Some((j.index?, j.pixel))).collect();
-    let mut ends = Vec::new();
-    for junction in junctions {
-        let Some((i, j)) = junction.index else { continue };
-        for next in [(i.wrapping_add(1), j), (i, j.wrapping_add(1))] {
-            if let Some(&pixel) = at.get(&next) {
-                ends.extend([point(junction.pixel), point(pixel)]);
-            }
+/// How twines of each state are drawn, as in the overlays: red, green, blue, opacity, and width.
+const STROKES: [(TwineState, [f64; 4], f64); 6] = [
+    (TwineState::Unknown, [0.24, 0.86, 1.0, 0.25], 1.0),
+    (TwineState::Present, [0.24, 0.86, 1.0, 0.6], 1.0),
+    (TwineState::Hidden, [0.6, 0.6, 0.63, 0.7], 1.0),
+    (TwineState::Fouled, [0.27, 0.82, 0.27, 0.7], 2.0),
+    (TwineState::Doubtful, [1.0, 0.16, 0.16, 0.9], 2.0),
+    (TwineState::Missing, [1.0, 0.16, 0.16, 0.9], 2.0),
+];
+/// Dashes of twine that looks gone but may not be.
+const DASHES: u32 = 3;
+
+/// Ends of the strokes, two points each, by the state of their twine.
+fn lines(junctions: &[Junction], twines: &[Twine]) -> HashMap<&'static str, Vec<Point2>> {
+    let knots = Knots::new(junctions);
+    let mut by_state: HashMap<&'static str, Vec<Point2>> = HashMap::new();
+    let mut line = |twine: &Twine| {
+        let Some([from, to]) = knots.ends(twine) else { return };
+        let dashes = if twine.state == TwineState::Doubtful { DASHES } else { 1 };
+        let part = (to - from) / f64::from(2 * dashes - 1);
+        let ends = by_state.entry(twine.state.as_str()).or_default();
+        for dash in 0..dashes {
+            let start = from + part * f64::from(2 * dash);
+            ends.extend([point(start), point(start + part)]);
         }
+    };
+    if twines.is_empty() {
+        let state = TwineState::Present;
+        for index in junctions.iter().filter_map(|j| j.index) {
+            (0..2).for_each(|direction| {
+                line(&Twine { index, direction, state, llr: 0.0, contrast: 0.0, width_px: None })
+            });
+        }
+    } else {
+        twines.iter().for_each(line);
     }
-    ends
+    by_state
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No line through a gap looks like twine.
+    #[test]
+    fn twines_have_the_colour_of_their_state() {
+        let knot = |i: i32, j: i32| Junction {
+            pixel: Vector2::new(f64::from(10 * i), f64::from(10 * j)),
+            index: Some((i, j)),
+            sigma_px: 0.1,
+            state: JunctionState::Seen,
+        };
+        let junctions = [knot(0, 0), knot(1, 0), knot(2, 0), knot(0, 1), knot(1, 1)];
+        let twine =
+            |index, direction, state| Twine { index, direction, state, llr: 0.0, contrast: 5.0, width_px: None };
+        let twines = [
+            twine((0, 0), 0, TwineState::Missing),
+            twine((1, 0), 0, TwineState::Doubtful),
+            twine((0, 0), 1, TwineState::Present),
+            // One of its ends is not in the list.
+            twine((2, 0), 0, TwineState::Present),
+        ];
+        let of = |state: TwineState, twines: &[Twine]| -> Vec<(f64, f64)> {
+            let ends = lines(&junctions, twines).remove(state.as_str()).unwrap_or_default();
+            ends.iter().map(|p| (p.x, p.y)).collect()
+        };
+        assert_eq!(of(TwineState::Missing, &twines), [(0.5, 0.5), (10.5, 0.5)]);
+        assert_eq!(of(TwineState::Present, &twines), [(0.5, 0.5), (0.5, 10.5)]);
+        let dashes = of(TwineState::Doubtful, &twines).iter().map(|p| p.0).collect::<Vec<_>>();
+        assert_eq!(dashes, [10.5, 12.5, 14.5, 16.5, 18.5, 20.5]);
+        // A method that does not tell of twines.
+        assert_eq!(of(TwineState::Present, &[]).len(), 10);
+        // Every state has a stroke of its own, and each stands in the message once.
+        assert!(TwineState::ALL.iter().all(|s| STROKES.iter().filter(|(of, ..)| of == s).count() == 1));
+        let row = PoseRow::unreadable(0, "f.png", Some(1));
+        let message = annotations(&row, &junctions, &twines, Timestamp { seconds: 0, nanos: 1 });
+        assert_eq!(message.points.len(), 4);
+    }
 }

@@ -124,26 +124,33 @@ mod tests {
         }
     }
 
-    /// A missing twine is red, from knot to knot.
+    /// A missing twine is red from knot to knot, one that looks gone in dashes: neither is drawn like one that is there.
     #[test]
     fn twines_have_the_colour_of_their_state() {
         let camera = Camera::new(600.0, 600.0, 99.5, 99.5, 200, 200, Lens::None).unwrap();
         let knot = |k: i32| Junction {
-            pixel: Vector2::new(f64::from(40 + 60 * k), 150.0),
+            pixel: Vector2::new(f64::from(65 + 50 * k), 150.0),
             index: Some((k, 0)),
             sigma_px: 0.1,
             state: JunctionState::Seen,
         };
-        let twine = |k: i32, state| Twine { index: (k, 0), direction: 0, state, llr: 0.0, contrast: 5.0 };
-        let twines = &[twine(0, netpose::TwineState::Present), twine(1, netpose::TwineState::Missing)];
-        let junctions = &[knot(0), knot(1), knot(2)];
+        let twine =
+            |k: i32, state| Twine { index: (k - 1, 0), direction: 0, state, llr: 0.0, contrast: 5.0, width_px: None };
+        let states = [netpose::TwineState::Present, netpose::TwineState::Missing, netpose::TwineState::Doubtful];
+        let twines = &[0, 1, 2].map(|k| twine(k, states[k as usize]));
+        let junctions = &[knot(-1), knot(0), knot(1), knot(2)];
         let shown = Shown { status: Status::Ok, probability: 0.9, net: None, junctions, twines, latency_ms: 5.0 };
         let dark = net_image::Image::<u8>::new(200, 200);
         let overlay = Overlay { camera, mesh: Mesh::square(0.05).unwrap() };
         let canvas = overlay.draw(dark.view().unwrap(), "frame 7", &shown);
-        let (present, missing) = (canvas.pixel(70, 150), canvas.pixel(130, 150));
-        assert!(present[2] > 100 && present[0] < 60, "{present:?}");
-        assert!(missing[0] > 200 && missing[2] < 60, "{missing:?}");
+        // Between the rings.
+        let row = |from: usize| (from..from + 26).map(|u| canvas.pixel(u, 150)).collect::<Vec<Colour>>();
+        let red = |c: &&Colour| c[0] > 200 && c[2] < 60;
+        let [present, missing, doubtful] = [row(27), row(77), row(127)];
+        assert!(present.iter().all(|c| c[2] > 100 && c[0] < 60), "{present:?}");
+        assert_eq!(missing.iter().filter(red).count(), 26, "{missing:?}");
+        let (dashes, gaps) = (doubtful.iter().filter(red).count(), doubtful.iter().filter(|c| c[0] < 60).count());
+        assert!(dashes > 5 && gaps > 12 && doubtful.iter().all(|c| c[2] < 60), "{doubtful:?}");
     }
 
     /// The lattice is drawn where the pose says: bright lines on the nodes, nothing in the middle of the cells.

@@ -1,9 +1,9 @@
 //! The net as its pose says it hangs, drawn over the picture: where lines and twine part, the pose is wrong.
 
-use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
 use net_geometry::nalgebra::{Matrix2, Vector2, Vector3};
+use net_log::Knots;
 use netpose::{Camera, Junction, JunctionState, Mesh, Pose, Twine, TwineState};
 
 use super::canvas::{Canvas, Colour};
@@ -20,38 +20,47 @@ const MOST_LINES: f64 = 400.0;
 /// Cells smaller than this, px, are drawn every second, fourth, ... line.
 const LEAST_GAP_PX: f64 = 7.0;
 
-/// How each state of a twine is drawn: colour, width in px, opacity.
-fn stroke(state: TwineState) -> (Colour, f64, f64) {
+/// Dashes of twine that looks gone but may not be.
+const DASHES: usize = 3;
+
+/// How each state of a twine is drawn: colour, width in px, opacity, and in how many strokes.
+fn stroke(state: TwineState) -> (Colour, f64, f64, usize) {
     match state {
-        TwineState::Present => (LINE, 1.0, 0.6),
-        TwineState::Unknown | TwineState::Doubtful => (LINE, 1.0, 0.25),
-        TwineState::Missing => (MISSING, 2.0, 0.9),
-        TwineState::Hidden => (HIDDEN, 1.0, 0.7),
-        TwineState::Fouled => (FOULED, 2.0, 0.7),
+        TwineState::Present => (LINE, 1.0, 0.6, 1),
+        TwineState::Unknown => (LINE, 1.0, 0.25, 1),
+        TwineState::Missing => (MISSING, 2.0, 0.9, 1),
+        TwineState::Doubtful => (MISSING, 2.0, 0.9, DASHES),
+        TwineState::Hidden => (HIDDEN, 1.0, 0.7, 1),
+        TwineState::Fouled => (FOULED, 2.0, 0.7, 1),
     }
 }
 
 /// Draws the twine between junctions that have a name, each in the colour of its state: follows a bent net, which no plane does. False if none has a name.
 pub fn draw_twine(canvas: &mut Canvas, junctions: &[Junction], twines: &[Twine]) -> bool {
-    let named: HashMap<(i32, i32), Vector2<f64>> =
-        junctions.iter().filter_map(|junction| Some((junction.index?, junction.pixel))).collect();
-    let mut line = |(i, j): (i32, i32), direction: usize, state: TwineState| {
-        let next = if direction == 0 { (i.saturating_add(1), j) } else { (i, j.saturating_add(1)) };
-        if let (Some(from), Some(to)) = (named.get(&(i, j)), named.get(&next)) {
-            let (colour, width, opacity) = stroke(state);
-            canvas.line(*from, *to, width, colour, opacity);
+    let knots = Knots::new(junctions);
+    let mut line = |twine: &Twine| {
+        if let Some([from, to]) = knots.ends(twine) {
+            let (colour, width, opacity, dashes) = stroke(twine.state);
+            // As wide as the gaps between them, with a dash at either end.
+            let part = (to - from) / (2 * dashes - 1) as f64;
+            for dash in 0..dashes {
+                let start = from + part * (2 * dash) as f64;
+                canvas.line(start, start + part, width, colour, opacity);
+            }
         }
     };
     // In the order of lists: a map's own order differs from run to run, and so would the overlapping strokes.
     if twines.is_empty() {
+        let state = TwineState::Present;
         for index in junctions.iter().filter_map(|junction| junction.index) {
-            line(index, 0, TwineState::Present);
-            line(index, 1, TwineState::Present);
+            (0..2).for_each(|direction| {
+                line(&Twine { index, direction, state, llr: 0.0, contrast: 0.0, width_px: None })
+            });
         }
     } else {
-        twines.iter().for_each(|t| line(t.index, t.direction, t.state));
+        twines.iter().for_each(line);
     }
-    !named.is_empty()
+    !knots.is_empty()
 }
 
 /// Draws the lattice lines.

@@ -1,5 +1,6 @@
 //! Tables of poses: what a run wrote, and truths.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -68,7 +69,7 @@ impl Row {
     }
 }
 
-/// Reads a table whose first line names its columns.
+/// Reads a table whose first line names its columns and which has at most one row for each frame.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
     let mut reader = csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
     let headers = reader.headers().with_context(|| format!("cannot read {}", path.display()))?;
@@ -77,6 +78,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
     }
     let headers = headers.clone();
     let mut rows = Vec::new();
+    let mut lines = HashMap::new();
     for record in reader.records() {
         let record = record.with_context(|| format!("cannot read {}", path.display()))?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -91,6 +93,13 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         })?;
         if let Some(flaw) = row.flaw() {
             bail!("{}, line {line}: {flaw}", path.display());
+        }
+        if let Some(earlier) = lines.insert(row.frame, line) {
+            bail!(
+                "{}, line {line}: frame {} is in line {earlier} already; give a table with one row for each frame",
+                path.display(),
+                row.frame
+            );
         }
         rows.push(row);
     }

@@ -57,7 +57,9 @@ pub fn write<S: TileStore>(
         let clean = clean.get(&track).copied().unwrap_or(0.0);
         type Paint<'a> = &'a dyn Fn(&Cell) -> Option<[Colour; PATCH * PATCH]>;
         let growth = |cell: &Cell| {
-            let share = cell.blocked_share()?;
+            let Some(share) = cell.blocked_share() else {
+                return Some(cell.patch.map(|g| tint(g, NEVER_SEEN, 0.6)));
+            };
             let much = ((share - clean) / MUCH_GROWTH).clamp(0.0, 1.0);
             Some(cell.patch.map(|g| tint(g, [40, 200, 60], 0.7 * much)))
         };

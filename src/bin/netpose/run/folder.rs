@@ -138,7 +138,8 @@ impl Folder {
             Ok(tracked) => self.tracking.add(milliseconds(tracked.latency)),
             Err(why) => self.summary.name_unreadable(frame.index, &frame.name, &why),
         }
-        self.files.write(&row, tracked.map_or(&[][..], |t| &t.junctions))?;
+        let (junctions, twines) = tracked.map_or((&[][..], &[][..]), |t| (&t.junctions, &t.twines));
+        self.files.write(&row, junctions, twines)?;
         self.summary.count(row.status);
         self.writing.add(milliseconds(start.elapsed()));
         Ok(())
