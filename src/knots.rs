@@ -24,8 +24,18 @@ pub(crate) struct Knots {
     rows: i32,
     /// Pixels, row by row along the first direction.
     pixels: Vec<Option<Vector2<f64>>>,
-    /// How far the seen ones are from the sheet.
-    shifts: Vec<Option<Vector2<f64>>>,
+    /// How far the seen ones are from the sheet, as far as that was asked.
+    shifts: Vec<Shift>,
+}
+
+/// A node's distance from the sheet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shift {
+    /// None: it was not seen, or the sheet does not reach there.
+    Unknown,
+    /// Seen here; the sheet, which takes its time, was not asked.
+    Unasked(Vector2<f64>),
+    Known(Vector2<f64>),
 }
 
 /// Nodes that there is room for from the start: cells of a hundredth of the picture's width.
@@ -63,11 +73,11 @@ impl Knots {
         (self.columns, self.rows) = (columns as i32, rows as i32);
         let n = (columns * rows) as usize;
         self.pixels.resize(n, None);
-        self.shifts.resize(n, None);
+        self.shifts.resize(n, Shift::Unknown);
         for ((i, j), pixel) in seen() {
             if let Some(k) = self.place(i, j) {
                 self.pixels[k] = Some(pixel);
-                self.shifts[k] = sheet(self.name(k)).map(|p| pixel - p);
+                self.shifts[k] = Shift::Unasked(pixel);
             }
         }
         for k in 0..n {
@@ -75,9 +85,10 @@ impl Knots {
                 continue;
             }
             let name = self.name(k);
-            self.pixels[k] = self.around(k, REACH, FEWEST).map(|(shift, _)| shift).and_then(|s| Some(sheet(name)? + s));
+            self.pixels[k] =
+                self.around(k, REACH, FEWEST, &sheet).map(|(shift, _)| shift).and_then(|s| Some(sheet(name)? + s));
             if self.pixels[k].is_none()
-                && let Some((shift, spread)) = self.around(k, FAR_REACH, FAR_FEWEST)
+                && let Some((shift, spread)) = self.around(k, FAR_REACH, FAR_FEWEST, &sheet)
                 && let (Some(pixel), Some(next)) = (sheet(name), sheet(name + Vector2::x()))
             {
                 self.pixels[k] = (spread < ALIKE_CELLS * (next - pixel).norm()).then(|| pixel + shift);
@@ -86,12 +97,22 @@ impl Knots {
     }
 
     /// Mean displacement of the seen nodes around a place, and their spread.
-    fn around(&self, k: usize, reach: i32, fewest: usize) -> Option<(Vector2<f64>, f64)> {
+    fn around(
+        &mut self,
+        k: usize,
+        reach: i32,
+        fewest: usize,
+        sheet: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> Option<(Vector2<f64>, f64)> {
         let (i, j) = (self.first.0 + k as i32 % self.columns, self.first.1 + k as i32 / self.columns);
         let (mut sum, mut squares, mut n) = (Vector2::zeros(), 0.0, 0);
         for b in -reach..=reach {
             for a in -reach..=reach {
-                if let Some(shift) = self.place(i + a, j + b).and_then(|k| self.shifts[k]) {
+                let Some(place) = self.place(i + a, j + b) else { continue };
+                if let Shift::Unasked(pixel) = self.shifts[place] {
+                    self.shifts[place] = sheet(self.name(place)).map_or(Shift::Unknown, |p| Shift::Known(pixel - p));
+                }
+                if let Shift::Known(shift) = self.shifts[place] {
                     sum += shift;
                     squares += shift.norm_squared();
                     n += 1;
