@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 
 use crate::arrays::array2;
 use crate::pickle::{
-    JunctionNumbers, LayerNumbers, from_junction, from_layer, from_net, to_connection, to_junction, to_layer, to_net,
-    to_status,
+    JunctionNumbers, LayerNumbers, TwineNumbers, from_junction, from_layer, from_net, from_twine, to_connection,
+    to_junction, to_layer, to_net, to_status, to_twine,
 };
 
 /// What one frame says.
@@ -26,6 +26,7 @@ pub struct Estimate {
     log_odds: Option<f64>,
     net: Option<netpose::NetPose>,
     junctions: Vec<netpose::Junction>,
+    twines: Vec<netpose::Twine>,
     layers: Vec<netpose::Layer>,
 }
 
@@ -123,8 +124,17 @@ impl Layer {
 }
 
 /// What [`Estimate`] holds, in the order of its fields.
-type EstimateState =
-    (String, f64, u32, String, Vec<Shift>, Option<f64>, Option<Vec<f64>>, Vec<JunctionNumbers>, Vec<LayerNumbers>);
+type EstimateState = (
+    String,
+    f64,
+    u32,
+    String,
+    Vec<Shift>,
+    Option<f64>,
+    Option<Vec<f64>>,
+    (Vec<JunctionNumbers>, Vec<TwineNumbers>),
+    Vec<LayerNumbers>,
+);
 
 impl Estimate {
     /// Copies what must outlive the frame.
@@ -140,6 +150,7 @@ impl Estimate {
             log_odds: estimate.vote.map(|vote| vote.log_odds),
             net: estimate.net,
             junctions: estimate.junctions.to_vec(),
+            twines: estimate.twines.to_vec(),
             layers: estimate.layers.to_vec(),
         }
     }
@@ -160,14 +171,14 @@ impl Estimate {
             self.shifts.clone(),
             self.log_odds,
             self.net.as_ref().map(from_net),
-            self.junctions.iter().map(from_junction).collect(),
+            (self.junctions.iter().map(from_junction).collect(), self.twines.iter().map(from_twine).collect()),
             self.layers.iter().map(from_layer).collect(),
         );
         Ok((py.get_type::<Self>().getattr("_from_state")?, (state,)))
     }
     #[staticmethod]
     fn _from_state(state: EstimateState) -> PyResult<Self> {
-        let (status, probability, track, connection, shifts, log_odds, net, junctions, layers) = state;
+        let (status, probability, track, connection, shifts, log_odds, net, (junctions, twines), layers) = state;
         Ok(Self {
             status: to_status(&status)?,
             probability,
@@ -177,6 +188,7 @@ impl Estimate {
             log_odds,
             net: net.as_deref().map(to_net).transpose()?,
             junctions: junctions.into_iter().map(to_junction).collect::<PyResult<_>>()?,
+            twines: twines.into_iter().map(to_twine).collect::<PyResult<_>>()?,
             layers: layers.iter().map(to_layer).collect::<PyResult<_>>()?,
         })
     }
@@ -217,6 +229,27 @@ impl Estimate {
     #[getter]
     fn states(&self) -> Vec<&'static str> {
         self.junctions.iter().map(|j| j.state.as_str()).collect()
+    }
+    #[getter]
+    fn twines<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let row = |t: &netpose::Twine| [i64::from(t.index.0), i64::from(t.index.1), t.direction as i64];
+        array2(py, self.twines.iter().flat_map(row).collect(), self.twines.len(), 3)
+    }
+    #[getter]
+    fn twine_states(&self) -> Vec<&'static str> {
+        self.twines.iter().map(|t| t.state.as_str()).collect()
+    }
+    #[getter]
+    fn twine_llr<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.twines.iter().map(|t| f64::from(t.llr)).collect::<Vec<_>>().to_pyarray(py)
+    }
+    #[getter]
+    fn twine_contrast<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.twines.iter().map(|t| f64::from(t.contrast)).collect::<Vec<_>>().to_pyarray(py)
+    }
+    #[getter]
+    fn twine_width_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.twines.iter().map(|t| t.width_px.map_or(f64::NAN, f64::from)).collect::<Vec<_>>().to_pyarray(py)
     }
     #[getter]
     fn shifts(&self) -> Vec<Shift> {

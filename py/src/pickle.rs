@@ -2,12 +2,14 @@
 
 use net_geometry::nalgebra::{Matrix3, Matrix6, Rotation3, Vector2, Vector3};
 use net_geometry::{Junction, JunctionState, Plane, Pose};
-use netpose::{Connection, Layer, NetPose, Sheet, Status};
+use netpose::{Connection, Layer, NetPose, Sheet, Status, Twine, TwineState};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// `u, v`, indices, sigma in px, state.
 pub type JunctionNumbers = (f64, f64, Option<(i32, i32)>, f64, String);
+/// Indices and direction, state, log likelihood ratio, contrast, width in px.
+pub type TwineNumbers = (i32, i32, usize, String, f32, f32, Option<f32>);
 /// The net, its probability, whether it is followed.
 pub type LayerNumbers = (Vec<f64>, f64, bool);
 
@@ -74,6 +76,18 @@ pub fn to_junction((u, v, index, sigma_px, state): JunctionNumbers) -> PyResult<
     use JunctionState::{Fouled, Hidden, Inferred, Missing, Seen};
     let known = [Seen, Hidden, Fouled, Missing, Inferred].into_iter().find(|known| known.as_str() == state);
     Ok(Junction { pixel: Vector2::new(u, v), index, sigma_px, state: known.ok_or_else(|| foreign(state))? })
+}
+
+/// A twine as numbers.
+pub fn from_twine(twine: &Twine) -> TwineNumbers {
+    let Twine { index, direction, state, llr, contrast, width_px } = twine;
+    (index.0, index.1, *direction, state.as_str().to_owned(), *llr, *contrast, *width_px)
+}
+
+/// The twine that [`from_twine`] took apart.
+pub fn to_twine((i, j, direction, state, llr, contrast, width_px): TwineNumbers) -> PyResult<Twine> {
+    let state = TwineState::ALL.into_iter().find(|known| known.as_str() == state).ok_or_else(|| foreign(state))?;
+    Ok(Twine { index: (i, j), direction, state, llr, contrast, width_px })
 }
 
 /// A layer as numbers.

@@ -46,6 +46,7 @@ def test_grey_water_is_no_net(grey: int) -> None:
     ):
         assert value is None
     assert result.junctions.shape == (0, 2) and result.lattice.shape == (0, 2)
+    assert result.twines.shape == (0, 3) and result.twine_states == [] and result.twine_width_px.shape == (0,)
     assert result.sigma_px.shape == (0,) and result.states == [] and result.shifts == []
     assert result.junctions.dtype == np.float64 and result.lattice.dtype == np.int64
     assert "no_net" in repr(result)

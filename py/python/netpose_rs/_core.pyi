@@ -146,6 +146,22 @@ class Estimate:
         count before the doubt goes on. ``recognised``: the net was lost, and what was seen of its cells before told which ones these are.
         ``restarted``: it was lost, and a new count began."""
     @property
+    def twines(self) -> npt.NDArray[np.int64]:
+        """(M, 3): each twine's first end (i, j), and 0 if it leads to (i + 1, j) or 1 to (i, j + 1). Those between named nodes in view;
+        none from ``method="thesis"``."""
+    @property
+    def twine_states(self) -> list[Literal["present", "missing", "doubtful", "hidden", "fouled", "unknown"]]:
+        """What is known of each of the ``twines``. ``doubtful``: looks gone, as some of a picture's thousands of twines do by chance."""
+    @property
+    def twine_llr(self) -> npt.NDArray[np.float64]:
+        """(M,) log likelihood ratio of each, present to missing."""
+    @property
+    def twine_contrast(self) -> npt.NDArray[np.float64]:
+        """(M,) how many standard deviations the neighbourhood's twines stand out from lines half a mesh aside."""
+    @property
+    def twine_width_px(self) -> npt.NDArray[np.float64]:
+        """(M,) apparent width of each, px, growth included; NaN where the picture does not tell."""
+    @property
     def shifts(self) -> list[tuple[int, int, float]]:
         """The likeliest shifts (i, j) in cells *per frame* of the names that this frame came with, and by how many deviations each stands
         out, best first: what does not repeat in the picture says so, over as many frames as were in doubt. Empty where there was nothing to
