@@ -73,8 +73,7 @@ pub fn from_junction(junction: &Junction) -> JunctionNumbers {
 
 /// The junction that [`from_junction`] took apart.
 pub fn to_junction((u, v, index, sigma_px, state): JunctionNumbers) -> PyResult<Junction> {
-    use JunctionState::{Fouled, Hidden, Inferred, Missing, Seen};
-    let known = [Seen, Hidden, Fouled, Missing, Inferred].into_iter().find(|known| known.as_str() == state);
+    let known = JunctionState::ALL.into_iter().find(|known| known.as_str() == state);
     Ok(Junction { pixel: Vector2::new(u, v), index, sigma_px, state: known.ok_or_else(|| foreign(state))? })
 }
 

@@ -19,6 +19,9 @@ pub enum JunctionState {
 }
 
 impl JunctionState {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Seen, Self::Hidden, Self::Fouled, Self::Missing, Self::Inferred];
+
     /// The word used in files.
     pub fn as_str(self) -> &'static str {
         match self {

@@ -21,20 +21,24 @@ fn camera(lens: Lens) -> Camera {
     Camera::new(420.5, 421.25, 423.0, 239.125, 848, 480, lens).unwrap()
 }
 
+/// Writes other bytes at these parts of a file, and cuts it there.
+fn damage(path: &Path, cut: f64, changes: &[(f64, u8)]) {
+    let mut bytes = std::fs::read(path).unwrap();
+    let length = bytes.len() as f64;
+    for &(at, byte) in changes {
+        bytes[(at * length) as usize] = byte;
+    }
+    bytes.truncate((cut * length) as usize);
+    std::fs::write(path, bytes).unwrap();
+}
+
 /// `count` junctions, named but for every seventh.
 fn junctions(frame: u64, count: usize) -> Vec<Junction> {
-    let states = [
-        JunctionState::Seen,
-        JunctionState::Hidden,
-        JunctionState::Fouled,
-        JunctionState::Missing,
-        JunctionState::Inferred,
-    ];
     let junction = |n: usize| Junction {
         pixel: Vector2::new(frame as f64 + n as f64 / 3.0, -1.5 * n as f64),
         index: (!n.is_multiple_of(7)).then_some((n as i32 - 5, frame as i32)),
         sigma_px: 0.01 * n as f64,
-        state: states[n % states.len()],
+        state: JunctionState::ALL[n % JunctionState::ALL.len()],
     };
     (0..count).map(junction).collect()
 }
@@ -414,13 +418,7 @@ proptest! {
         let mut writer = TwinesParquet::create(&path).unwrap();
         (0..4).for_each(|f| writer.write(f, &twines(f, 20)).unwrap());
         writer.finish().unwrap();
-        let mut bytes = std::fs::read(&path).unwrap();
-        for (at, byte) in changes {
-            let at = (at * bytes.len() as f64) as usize;
-            bytes[at] = byte;
-        }
-        bytes.truncate((cut * bytes.len() as f64) as usize);
-        std::fs::write(&path, bytes).unwrap();
+        damage(&path, cut, &changes);
         if let Ok(frames) = read_twines(&path) {
             for (_, found) in frames.map_while(Result::ok) {
                 prop_assert!(!found.is_empty());
@@ -436,13 +434,7 @@ proptest! {
         let mut writer = JunctionsParquet::create(&path).unwrap();
         (0..4).for_each(|f| writer.write(f, &junctions(f, 20)).unwrap());
         writer.finish().unwrap();
-        let mut bytes = std::fs::read(&path).unwrap();
-        for (at, byte) in changes {
-            let at = (at * bytes.len() as f64) as usize;
-            bytes[at] = byte;
-        }
-        bytes.truncate((cut * bytes.len() as f64) as usize);
-        std::fs::write(&path, bytes).unwrap();
+        damage(&path, cut, &changes);
         if let Ok(frames) = read_junctions(&path) {
             // What reads without an error has all its parts.
             for (_, found) in frames.map_while(Result::ok) {

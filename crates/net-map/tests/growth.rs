@@ -1,10 +1,12 @@
 //! Growth on simulated nets against what the simulator drew, and none on clean ones.
 
+mod support;
+
 use std::collections::BTreeMap;
 
 use net_geometry::nalgebra::Vector2;
-use net_junction::{AdjustConfig, ExpectedNet, NetAdjuster, TwineState};
-use net_map::{Config, Frame, Mapper, Seen, TwineLook};
+use net_junction::{AdjustConfig, ExpectedNet, NetAdjuster};
+use net_map::{Config, Frame, Mapper};
 use net_sim::{Growth, Image, Light, Scenario, Sensor, Simulator, Twine, Water};
 
 /// A mesh of which something is said.
@@ -70,23 +72,7 @@ fn run(scenario: &Scenario, frames: &[u32]) -> Run {
         let expected = ExpectedNet { camera, mesh, pose, anchored: true };
         let view = image.view().expect("pixels");
         adjuster.adjust(view, &expected).expect("the size is right");
-        let twines: Vec<TwineLook> = adjuster
-            .twines()
-            .iter()
-            .map(|t| TwineLook {
-                index: t.index,
-                direction: t.direction,
-                seen: match t.state {
-                    TwineState::Unknown => Seen::Unknown,
-                    TwineState::Present => Seen::Present,
-                    TwineState::Missing | TwineState::Doubtful => Seen::Missing,
-                    TwineState::Hidden => Seen::Hidden,
-                    TwineState::Fouled => Seen::Fouled,
-                },
-                llr: t.llr,
-                contrast: t.contrast,
-            })
-            .collect();
+        let twines = support::looks(adjuster.twines());
         // Bilinear between the knots.
         let pixel = |at: Vector2<f64>| {
             let (i, j) = (at.x.floor() as i32, at.y.floor() as i32);

@@ -1,10 +1,12 @@
 //! A camera along simulated nets with holes and growth: what the map says against what the simulator made.
 
+mod support;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use net_geometry::nalgebra::{Vector2, Vector3};
 use net_geometry::{Camera, Lens, Mesh};
-use net_junction::{AdjustConfig, ExpectedNet, NetAdjuster, TwineState};
+use net_junction::{AdjustConfig, ExpectedNet, NetAdjuster};
 use net_map::{Config, Frame, Mapper, Seen, Tile, TileKey, TwineLook};
 use net_sim::{Growth, Hole, Image, Layer, Net, NetPose, Scene, Simulator, Water};
 
@@ -46,23 +48,7 @@ fn run(net: Net, frames: u32, config: &Config) -> Run {
         let expected = ExpectedNet { camera, mesh, pose: pose.pose(), anchored: true };
         let view = image.view().expect("pixels");
         adjuster.adjust(view, &expected).expect("the size is right");
-        let twines: Vec<TwineLook> = adjuster
-            .twines()
-            .iter()
-            .map(|t| TwineLook {
-                index: t.index,
-                direction: t.direction,
-                seen: match t.state {
-                    TwineState::Unknown => Seen::Unknown,
-                    TwineState::Present => Seen::Present,
-                    TwineState::Missing | TwineState::Doubtful => Seen::Missing,
-                    TwineState::Hidden => Seen::Hidden,
-                    TwineState::Fouled => Seen::Fouled,
-                },
-                llr: t.llr,
-                contrast: t.contrast,
-            })
-            .collect();
+        let twines = support::looks(adjuster.twines());
         let pixel = |at: Vector2<f64>| {
             let point = expected.pose.transform(mesh.node(at.x, at.y).push(0.0));
             Some((camera.pixel_from_point(point)?, point.z))

@@ -97,14 +97,8 @@ impl FrameRow for Junction {
             .map(|row| {
                 let index = if indexed.get(row) == Some(&1) { indices.next() } else { None };
                 let word = state[row].as_utf8()?;
-                let states = [
-                    JunctionState::Seen,
-                    JunctionState::Hidden,
-                    JunctionState::Fouled,
-                    JunctionState::Missing,
-                    JunctionState::Inferred,
-                ];
-                let state = states.into_iter().find(|s| s.as_str() == word).ok_or_else(|| unknown_state(word))?;
+                let state =
+                    JunctionState::ALL.into_iter().find(|s| s.as_str() == word).ok_or_else(|| unknown_state(word))?;
                 Ok(Self { pixel: Vector2::new(u[row], v[row]), index, sigma_px: sigma_px[row], state })
             })
             .collect()
