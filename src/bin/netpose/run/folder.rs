@@ -274,15 +274,12 @@ pub fn columns(net: &NetPose) -> NetColumns {
 
 fn appended(tracked: &Tracked, first_track: u32) -> Vec<f64> {
     // NaN is an empty cell.
-    let mut cells = vec![f64::NAN; APPENDED.len()];
-    let Some(net) = &tracked.net else { return cells };
-    cells[0] = f64::from(first_track.saturating_add(tracked.track));
+    let Some(net) = &tracked.net else { return vec![f64::NAN; APPENDED.len()] };
+    let track = f64::from(first_track.saturating_add(tracked.track));
+    let recognised = f64::from(u8::from(tracked.connection == Connection::Recognised));
     let hanging = hanging(net);
     let (before, behind) = hanging.split_at(RECOGNISED - 1);
-    cells[1..RECOGNISED].copy_from_slice(before);
-    cells[RECOGNISED] = f64::from(u8::from(tracked.connection == Connection::Recognised));
-    cells[RECOGNISED + 1..].copy_from_slice(behind);
-    cells
+    [&[track], before, &[recognised], behind].concat()
 }
 
 /// How a net hangs: [`APPENDED`] without `track` and `recognised`. NaN, an empty cell, for what was held and not estimated.
@@ -293,8 +290,8 @@ pub fn hanging(net: &NetPose) -> [f64; 11] {
         let (angle, sigma) = (sheet.crossing_angle, sheet.sigma_crossing_angle.unwrap_or(f64::NAN));
         let (mean, margin) = (sheet.mean_plane, sheet.cell_margin);
         let [x, y, z]: [f64; 3] = mean.normal.into();
-        let sheared = [angle.to_degrees(), sigma.to_degrees()];
-        [sheared[0], sheared[1], larger, smaller, sigma_larger, sigma_smaller, x, y, z, mean.distance, margin]
+        let (angle, sigma) = (angle.to_degrees(), sigma.to_degrees());
+        [angle, sigma, larger, smaller, sigma_larger, sigma_smaller, x, y, z, mean.distance, margin]
     })
 }
 

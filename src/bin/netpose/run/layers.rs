@@ -17,18 +17,17 @@ pub struct LayersCsv(PosesCsv);
 impl LayersCsv {
     /// A new file in the run's folder.
     pub fn create(dir: &Path) -> Result<Self> {
-        let (first, behind): (Vec<_>, Vec<_>) = hanging_names().enumerate().partition(|(k, _)| *k < SHEARED_AND_BENT);
-        let appended = first.into_iter().map(|(_, name)| name).chain(["layer", "followed"]);
-        let appended: Vec<&str> = appended.chain(behind.into_iter().map(|(_, name)| name)).collect();
-        Ok(Self(PosesCsv::create(&path(dir), &appended)?))
+        let names: Vec<&str> = hanging_names().collect();
+        let (first, behind) = names.split_at(SHEARED_AND_BENT);
+        Ok(Self(PosesCsv::create(&path(dir), &[first, &["layer", "followed"], behind].concat())?))
     }
 
     /// One frame; none of its rows says more than `poses.csv` where there is one net alone.
     pub fn write(&mut self, frame: &RawFrame, tracked: &Tracked) -> Result<()> {
         for (number, layer) in tracked.layers.iter().enumerate() {
-            let mut appended = hanging(&layer.net).to_vec();
+            let hanging = hanging(&layer.net);
+            let (first, behind) = hanging.split_at(SHEARED_AND_BENT);
             let which = [number as f64, f64::from(u8::from(layer.followed))];
-            appended.splice(SHEARED_AND_BENT..SHEARED_AND_BENT, which);
             self.0.write(&PoseRow {
                 frame: frame.index,
                 file: frame.name.to_string(),
@@ -38,7 +37,7 @@ impl LayersCsv {
                 net: Some(columns(&layer.net)),
                 junctions: layer.followed.then_some(tracked.junctions.len() as u64),
                 latency_ms: Some(milliseconds(tracked.latency)),
-                appended,
+                appended: [first, &which, behind].concat(),
             })?;
         }
         Ok(())
